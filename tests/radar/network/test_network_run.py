@@ -121,7 +121,6 @@ def test_a_clock_that_is_off_unexpectedly_is_named(biased, tmp_path, caplog):
     finished(tmp_path, ["north", "south"], "late")
     off_s, of = re.search(r"the clock of south seems to be (.*) s ahead of that of (\w+)", caplog.text).groups()
     assert (float(off_s), of) == (pytest.approx(1.0, abs=0.3), "north")
-    assert "and has been estimated since it was sure" in caplog.text
     south = json.loads((tmp_path / "late" / "summary.json").read_text())["radars"]["south"]
     for name, true in (("time_s", 1.0), ("azimuth_deg", 1.0), ("range_m", 0.0)):
         assert abs(south[f"bias_{name}"] - true) < 3.5 * south[f"bias_{name.replace('_', '_sigma_')}"]

@@ -64,6 +64,12 @@ def test_of_radars_at_one_place_each_has_half():
     )
 
 
+def test_a_track_at_the_place_of_a_radar_has_finite_errors():
+    found = tracks(np.random.default_rng(5))
+    found.x[0, [0, 2]], found.x[1, [0, 2]] = PLACES
+    assert np.isfinite(added(found)).all()
+
+
 def test_biases_that_are_known_add_nothing():
     found = tracks(np.random.default_rng(2))
     np.testing.assert_array_equal(added(found, prior=0 * PRIOR), 0.0)

@@ -26,7 +26,7 @@ CLOCK_S = 1.0
 SURE = 3.3
 """Standard deviations of the estimate beyond which a clock is off."""
 FARTHEST_S = 3 * CLOCK_S
-"""s; errors of a clock beyond this come out too small, and are not estimated."""
+"""s; errors of a clock beyond this come out too small."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Network:
     made of it, and `stated` has in the tracks' errors what is not known of the biases.
 
     A second registration allows an error to each clock that is expected to have none. Once it is sure that one is off,
-    it is `registration`, for good: biases that are learnt without the clock are wrong.
+    it is `registration`, until comparisons contradict it: biases that are learnt without the clock are wrong.
     """
 
     def __init__(self, feeds: Sequence[Feed]) -> None:
@@ -55,12 +55,12 @@ class Network:
             sigma[:] = 0.0
         self._told_s = -np.inf
         self._R = np.array([np.diag(np.median(feed.plots.sigma[:, :2], axis=0) ** 2) for feed in feeds])
-        self.registration = self._registration(sigma)
+        self.registration = self._expected = self._registration(sigma)
         unexpected = sigma[:, :2].any(axis=1) & (sigma[:, 2] == 0)
         unexpected[0] = False
         sigma[unexpected, 2] = CLOCK_S
         self._unexpected, self._with_clocks = unexpected, self._registration(sigma)
-        self._off = np.zeros(len(feeds), bool)  # of which it is sure
+        self._off = np.zeros(len(feeds), bool)  # of which it has been sure
 
     def _registration(self, sigma: Floats) -> Registration:
         """A registration of all radars with these standard deviations of their biases (S, 3)."""
@@ -112,18 +112,22 @@ class Network:
         taken = Plotted(
             turn.station, tracks.id[took], plots.time_s[rows], plots.z[rows, :2], R, tracks.xy[took], tracks.v[took]
         )
-        self.registration.learn(turn.span.t, taken)
-        if self._unexpected.any() and self.registration is not self._with_clocks:
+        self._expected.learn(turn.span.t, taken)
+        if self._unexpected.any():
             self._with_clocks.learn(turn.span.t, taken)
-            off_s, sigma_s = np.abs(self._with_clocks.bias[:, 2]), self._with_clocks.sigma()[:, 2]
-            self._off = self._unexpected & (off_s > SURE * sigma_s)
-            if self._off.any() and off_s[self._off].max() < FARTHEST_S:
-                self.registration = self._with_clocks
+            self._judge_clocks()
+
+    def _judge_clocks(self) -> None:
+        """Decide which registration holds."""
+        off_s, sigma_s = np.abs(self._with_clocks.bias[:, 2]), self._with_clocks.sigma()[:, 2]
+        self._off |= self._unexpected & (off_s > SURE * sigma_s)
+        self._off &= self._with_clocks.told
+        self.registration = self._with_clocks if self._off.any() else self._expected
 
     def learnt_until(self, t: float) -> None:
         """The scans up to t come once more: they have told what they can of the biases."""
         self._told_s = t
-        self.registration.begin_anew()
+        self._expected.begin_anew()
         self._with_clocks.begin_anew()
 
     def warn_of_biases(self) -> None:
@@ -139,11 +143,10 @@ class Network:
         off_s, sigma_s = self._with_clocks.bias[:, 2], self._with_clocks.sigma()[:, 2]
         for k in np.flatnonzero(self._off).tolist():
             _log.warning(
-                "the clock of %s seems to be %s%.2f s %s that of %s (+- %.2f s), which radars.toml does not expect%s: "
-                "give the radar bias_time_s there", self.feeds[k].placed.name,
+                "the clock of %s seems to be %s%.2f s %s that of %s (+- %.2f s), which radars.toml does not expect; it "
+                "has been estimated since it was sure: give the radar bias_time_s there", self.feeds[k].placed.name,
                 "more than " if abs(off_s[k]) > FARTHEST_S else "", abs(off_s[k]),
                 "ahead of" if off_s[k] > 0 else "behind", self.feeds[0].placed.name, sigma_s[k],
-                ", and has been estimated since it was sure" if self.registration is self._with_clocks else "",
             )  # fmt: skip
 
     def as_dict(self) -> dict[str, dict[str, float | bool]]:

@@ -28,6 +28,9 @@ DRIFT, DRIFT_S = 0.1, 3600.0
 """A bias wanders by this share of its prior standard deviation in so many seconds."""
 FARTHEST_D2 = 18.4
 """Squared distance beyond which two plots are not of one target: the .9999 quantile of two dimensions."""
+USUAL_D2, UNUSUAL_D2, CONTRADICTED = 3.0, 12.0, 50.0
+"""A cumulative sum of squared distances less the first, each at most the second, tells by the third that an estimate is
+wrong. They are 2 in the mean; with an estimate that is right the sum gets there once in two million comparisons."""
 OBSERVED = 0.5
 """A bias has been observed if its standard deviation is less than this share of what it was."""
 
@@ -69,8 +72,9 @@ class Registration:
 
     used     number of comparisons in the estimate
 
-    An estimate that most comparisons of late contradict came from plots of different targets, or was right until a
-    clock or a radar was turned: it is given up, and the biases are learnt anew from the prior.
+    An estimate that comparisons contradict came from plots of different targets, or was right until a clock or a radar
+    was turned: it is given up, and the biases are learnt anew from the prior (E. S. Page, "Continuous inspection
+    schemes", Biometrika 41, 1954).
     """
 
     def __init__(self, origins: Sequence[tuple[float, float]], sigma: Floats, scan_s: Floats, jerk: float) -> None:
@@ -86,7 +90,7 @@ class Registration:
         """Know the prior only."""
         self._bias = np.zeros_like(self.prior)
         self._cov = np.diag(self.prior.ravel() ** 2)
-        self.used, self._contradicted = 0, 0
+        self.used, self._contradiction = 0, 0.0
 
     @property
     def told(self) -> bool:
@@ -196,8 +200,9 @@ class Registration:
         S = H @ self._cov @ H.transpose(0, 2, 1) + N
         d2 = np.einsum("ni,ni->n", y, np.linalg.solve(S, y[:, :, None])[:, :, 0])
         one = d2 < FARTHEST_D2
-        self._contradicted = max(self._contradicted + int(np.count_nonzero(~one) - np.count_nonzero(one)), 0)
-        if self._contradicted > np.count_nonzero(self.prior):
+        for each in np.minimum(d2, UNUSUAL_D2).tolist():
+            self._contradiction = max(self._contradiction + each - USUAL_D2, 0.0)
+        if self._contradiction > CONTRADICTED:
             self._forget()
             return
         y, H, N = y[one], H[one], N[one]

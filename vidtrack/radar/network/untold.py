@@ -20,6 +20,9 @@ from vidtrack.tracks import Tracks
 OUTSIDE = 1e-6
 """Share of its plots that a radar has outside its coverage: there tracks coast with the biases of all radars."""
 
+LEAST_M = 1e-3
+"""m; standard deviation of a position beside the radar's errors, which are none at its own place."""
+
 
 def with_untold(tracks: Tracks, registration: Registration, covered: Sequence[Floats], R: Floats) -> Tracks:
     """The tracks with what is not known of the biases in the covariances of their positions and velocities.
@@ -32,7 +35,7 @@ def with_untold(tracks: Tracks, registration: Registration, covered: Sequence[Fl
         position = derivatives(origin, tracks.xy, tracks.v)
         J.append(np.stack([position, _of_velocities(origin, tracks.xy, tracks.v)], axis=1))
         rate = (covered[k] + OUTSIDE) / registration.scan_s[k]
-        errors = in_plane(position, R[k] + registration.of(k)[1][:2, :2])
+        errors = in_plane(position, R[k] + registration.of(k)[1][:2, :2]) + LEAST_M**2 * np.eye(2)
         information.append(rate[:, None, None] * np.linalg.inv(errors))
     whole = np.linalg.inv(sum(information))
     H = np.concatenate([(whole @ own)[:, None] @ by for own, by in zip(information, J, strict=True)], axis=3)
