@@ -49,12 +49,12 @@ def simulate_network(
     while True:
         drawn = [Target(anywhere(rng, turning=k == 0)) for k in range(targets)]
         seen = {name: observe(radar, drawn, SCANS, rng) for name, radar in RADARS.items()}
-        if all(one.there.all() and _apart(one.states[..., :2]) for one in seen.values()):
+        if all(one.there.all() and apart(one.states[..., :2]) for one in seen.values()):
             break
-    seen["south"] = _biased(seen["south"], *bias)
+    seen["south"] = biased(seen["south"], *bias)
     times = np.sort(np.concatenate([one.times for one in seen.values()]))
     states = np.stack([np.hstack(target.flight(times)) for target in drawn])
-    there = np.stack([_covered(list(RADARS.values()), xyz) for xyz in states[..., :3]])
+    there = np.stack([covered(list(RADARS.values()), xyz) for xyz in states[..., :3]])
     return NetworkSeen(seen, times, states, there)
 
 
@@ -80,17 +80,17 @@ def _table(name: str, radar: Radar) -> str:
     return "\n".join([f"[radars.{name}]", *(f"{key} = {value}" for key, value in keys.items()), ""])
 
 
-def _biased(seen: Seen, range_m: float, azimuth_deg: float, time_s: float) -> Seen:
+def biased(seen: Seen, range_m: float, azimuth_deg: float, time_s: float) -> Seen:
     z = seen.z + np.array([range_m, azimuth_deg])
     z[:, 1] %= 360
     return replace(seen, z=z, time_s=seen.time_s + time_s, times=seen.times + time_s)
 
 
-def _apart(xy: Floats) -> bool:
+def apart(xy: Floats) -> bool:
     """No two of the aircraft (targets, K, 2) come near each other."""
     distance = np.linalg.norm(xy[:, None] - xy[None], axis=-1)
     return bool(distance[np.triu_indices(len(xy), 1)].min(initial=np.inf) > LEAST_APART_M)
 
 
-def _covered(radars: list[Radar], xyz: Floats) -> Mask:
+def covered(radars: list[Radar], xyz: Floats) -> Mask:
     return np.any([radar.covers(xyz) for radar in radars], axis=0)
