@@ -162,6 +162,14 @@ def test_a_right_estimate_is_never_given_up(seed):
     assert found.used > 0.99 * (150 - 2) * 5
 
 
+def test_errors_larger_than_stated_do_not_contradict_an_estimate_for_ever():
+    rng, prior = np.random.default_rng(11), PRIOR * [1, 1, 0]
+    bias = np.array([[0.0, 0.0, 0.0], [50.0, np.radians(1.0), 0.0]])
+    found = learnt(rng, bias, prior=prior, scans=200, noise=2.0)
+    assert found.used > 700  # of 995
+    assert np.degrees(found.bias[1, 1]) == pytest.approx(1.0, abs=0.1)
+
+
 def test_radars_that_share_no_target_do_not_make_the_others_less_sure():
     bias, origins = np.zeros((2, 3)), [*ORIGINS, (90e3, 0.0), (90e3, 9e3), (99e3, 0.0), (99e3, 9e3)]
     two = learnt(np.random.default_rng(8), bias)

@@ -28,9 +28,13 @@ DRIFT, DRIFT_S = 0.1, 3600.0
 """A bias wanders by this share of its prior standard deviation in so many seconds."""
 FARTHEST_D2 = 18.4
 """Squared distance beyond which two plots are not of one target: the .9999 quantile of two dimensions."""
-USUAL_D2, UNUSUAL_D2, CONTRADICTED = 3.0, 12.0, 50.0
-"""A cumulative sum of squared distances less the first, each at most the second, tells by the third that an estimate is
-wrong. They are 2 in the mean; with an estimate that is right the sum gets there once in two million comparisons."""
+MEAN_D2, MOST_D2 = 2.0, 12.0
+"""Mean of the squared distance of two plots of one target, and the most of it that one comparison counts."""
+SLACK, CONTRADICTED = 3.0, 50.0
+"""A cumulative sum of squared distances less the first tells by the second that an estimate is wrong; with one that is
+right it gets there once in two million comparisons."""
+STATED = 100.0
+"""Comparisons for which the stated errors of plots count, where comparisons tell that they are too small."""
 OBSERVED = 0.5
 """A bias has been observed if its standard deviation is less than this share of what it was."""
 
@@ -84,6 +88,7 @@ class Registration:
         self.jerk = jerk
         self._t: float | None = None
         self._taken: list[Plotted] = []
+        self._comparisons, self._distances = STATED, STATED * MEAN_D2
         self._forget()
 
     def _forget(self) -> None:
@@ -195,14 +200,25 @@ class Registration:
         bias = self._bias[plots.radar]
         return unbiased(plots.z - bias[:2], plots.R)[0] + plots.v * bias[2] + self.origins[plots.radar]
 
+    def _contradict(self, d2: Floats) -> bool:
+        """Whether comparisons with squared distances d2 (N,), after the earlier ones, contradict the estimate.
+
+        Errors of plots that are larger than stated do not: the distances are compared with their mean so far.
+        """
+        counted = np.minimum(d2, MOST_D2)
+        self._distances += counted.sum()
+        self._comparisons += len(counted)
+        scale = MEAN_D2 * self._comparisons / max(self._distances, MEAN_D2 * self._comparisons)
+        for each in (scale * counted).tolist():
+            self._contradiction = max(self._contradiction + each - SLACK, 0.0)
+        return self._contradiction > CONTRADICTED
+
     def _update(self, y: Floats, H: Floats, N: Floats) -> None:
         """Update the biases by differences (N, 2), without those that cannot be of one target."""
         S = H @ self._cov @ H.transpose(0, 2, 1) + N
         d2 = np.einsum("ni,ni->n", y, np.linalg.solve(S, y[:, :, None])[:, :, 0])
         one = d2 < FARTHEST_D2
-        for each in np.minimum(d2, UNUSUAL_D2).tolist():
-            self._contradiction = max(self._contradiction + each - USUAL_D2, 0.0)
-        if self._contradiction > CONTRADICTED:
+        if self._contradict(d2):
             self._forget()
             return
         y, H, N = y[one], H[one], N[one]
