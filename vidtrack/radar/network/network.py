@@ -25,6 +25,8 @@ CLOCK_S = 1.0
 """s; standard deviation of the error of a clock that is expected to have none, by which one is found."""
 SURE = 3.3
 """Standard deviations of the estimate beyond which a clock is off."""
+NAMED = 2.0
+"""Standard deviations beyond which such a clock is named at the end."""
 FARTHEST_S = 3 * CLOCK_S
 """s; errors of a clock beyond this come out too small."""
 
@@ -141,7 +143,7 @@ class Network:
                 "directions of %s wrong?", names(self.feeds),
             )  # fmt: skip
         off_s, sigma_s = self._with_clocks.bias[:, 2], self._with_clocks.sigma()[:, 2]
-        for k in np.flatnonzero(self._off).tolist():
+        for k in np.flatnonzero(self._off & (np.abs(off_s) > NAMED * sigma_s)).tolist():
             _log.warning(
                 "the clock of %s seems to be %s%.2f s %s that of %s (+- %.2f s), which radars.toml does not expect; it "
                 "has been estimated since it was sure: give the radar bias_time_s there", self.feeds[k].placed.name,
