@@ -21,17 +21,7 @@ from vidtrack.formats import read, read_states
 from vidtrack.radar.network.radars import read_radars
 from vidtrack.run.network import network_pipeline
 from vidtrack.run.run import Extras, Run
-from vidtrack.simulate.radar import Target, observe
-from vidtrack.simulate.radar_network import (
-    NORTH,
-    NetworkSeen,
-    apart,
-    biased,
-    covered,
-    simulate_network,
-    write_network,
-)
-from vidtrack.simulate.radar_scenarios import anywhere
+from vidtrack.simulate.radar_network import NORTH, biased, joined, observed, simulate_network, write_network
 
 BIAS = {"bias_range_m": 0, "bias_azimuth_deg": 0}
 NEAR_M = 2000.0
@@ -84,21 +74,14 @@ def drawn(options: argparse.Namespace, seed: int, folder: Path) -> dict[str, tup
         f"r{k}": replace(NORTH, place=(*place, 0.0), start_s=NORTH.scan_s * k / len(places))
         for k, place in enumerate(places)
     }
-    while True:
-        targets = [Target(anywhere(rng, turning=k == 0)) for k in range(options.targets)]
-        seen = {name: observe(radar, targets, options.scans, rng) for name, radar in radars.items()}
-        if all(one.there.all() and apart(one.states[..., :2]) for one in seen.values()):
-            break
+    targets, seen = observed(rng, radars, options.targets, options.scans)
     bias = {name: (rng.normal(0, 30), rng.normal(0, 1), options.clock * (k > 0)) for k, name in enumerate(radars)}
     seen = {name: biased(one, *bias[name]) for name, one in seen.items()}
     last = list(radars)[-1]
     late = seen[last].time_s > options.scans * NORTH.scan_s / 2
     seen[last].z[late, 1] = (seen[last].z[late, 1] + options.turned) % 360
     bias[last] = (bias[last][0], bias[last][1] + options.turned, bias[last][2])
-    times = np.sort(np.concatenate([one.times for one in seen.values()]))
-    states = np.stack([np.hstack(target.flight(times)) for target in targets])
-    there = np.stack([covered(list(radars.values()), xyz) for xyz in states[..., :3]])
-    write_network(NetworkSeen(seen, times, states, there), folder)
+    write_network(joined(targets, seen), folder)
     return bias
 
 

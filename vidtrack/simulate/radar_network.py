@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -45,16 +46,27 @@ def simulate_network(
 
     bias  what the second radar measures too much in range [m], azimuth [degrees] and time [s]
     """
-    rng = np.random.default_rng(seed)
+    drawn, seen = observed(np.random.default_rng(seed), RADARS, targets, SCANS)
+    seen["south"] = biased(seen["south"], *bias)
+    return joined(drawn, seen)
+
+
+def observed(
+    rng: np.random.Generator, radars: Mapping[str, Radar], targets: int, scans: int
+) -> tuple[list[Target], dict[str, Seen]]:
+    """Aircraft that stay 1.5 km apart and in the coverage of all radars, of which the first turns; what these see."""
     while True:
         drawn = [Target(anywhere(rng, turning=k == 0)) for k in range(targets)]
-        seen = {name: observe(radar, drawn, SCANS, rng) for name, radar in RADARS.items()}
-        if all(one.there.all() and apart(one.states[..., :2]) for one in seen.values()):
-            break
-    seen["south"] = biased(seen["south"], *bias)
+        seen = {name: observe(radar, drawn, scans, rng) for name, radar in radars.items()}
+        if all(one.there.all() and _apart(one.states[..., :2]) for one in seen.values()):
+            return drawn, seen
+
+
+def joined(drawn: Sequence[Target], seen: dict[str, Seen]) -> NetworkSeen:
+    """What the radars saw of the aircraft, with the truth at the stated times of all scans."""
     times = np.sort(np.concatenate([one.times for one in seen.values()]))
     states = np.stack([np.hstack(target.flight(times)) for target in drawn])
-    there = np.stack([covered(list(RADARS.values()), xyz) for xyz in states[..., :3]])
+    there = np.stack([np.any([one.radar.covers(xyz) for one in seen.values()], axis=0) for xyz in states[..., :3]])
     return NetworkSeen(seen, times, states, there)
 
 
@@ -81,16 +93,13 @@ def _table(name: str, radar: Radar) -> str:
 
 
 def biased(seen: Seen, range_m: float, azimuth_deg: float, time_s: float) -> Seen:
+    """What a radar saw, with these biases in its plots."""
     z = seen.z + np.array([range_m, azimuth_deg])
     z[:, 1] %= 360
     return replace(seen, z=z, time_s=seen.time_s + time_s, times=seen.times + time_s)
 
 
-def apart(xy: Floats) -> bool:
+def _apart(xy: Floats) -> bool:
     """No two of the aircraft (targets, K, 2) come near each other."""
     distance = np.linalg.norm(xy[:, None] - xy[None], axis=-1)
     return bool(distance[np.triu_indices(len(xy), 1)].min(initial=np.inf) > LEAST_APART_M)
-
-
-def covered(radars: list[Radar], xyz: Floats) -> Mask:
-    return np.any([radar.covers(xyz) for radar in radars], axis=0)

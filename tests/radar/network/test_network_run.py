@@ -112,12 +112,7 @@ def test_a_clock_that_is_not_expected_to_be_off_is_not_estimated(biased):
 def test_a_clock_that_is_off_unexpectedly_is_named(biased, tmp_path, caplog):
     for name in ("north.csv", "south.csv", "radars.toml"):
         (tmp_path / name).write_text((biased / name).read_text())
-    with (tmp_path / "south.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    with (tmp_path / "south.csv").open("w") as file:
-        table = csv.DictWriter(file, rows[0])
-        table.writeheader()
-        table.writerows(row | {"time_s": float(row["time_s"]) + 1.0} for row in rows)
+    changed(tmp_path / "south.csv", lambda row: {"time_s": float(row["time_s"]) + 1.0})
     finished(tmp_path, ["north", "south"], "late")
     off_s, of = re.search(r"the clock of south seems to be (.*) s ahead of that of (\w+)", caplog.text).groups()
     assert (float(off_s), of) == (pytest.approx(1.0, abs=0.3), "north")
@@ -144,7 +139,7 @@ def test_what_nothing_tells_of_biases_is_in_the_errors_of_tracks(biased, monkeyp
     there.mkdir()
     write_network(simulate_network(501, bias=(0.0, 0.0, 0.0)), there)
     for name in ("north", "south"):
-        turned(there / f"{name}.csv", 1.0)
+        changed(there / f"{name}.csv", lambda row: {"azimuth_deg": (float(row["azimuth_deg"]) + 1.0) % 360})
     run = finished(there, ["north", "south"], "run")
     assert (
         0.3 < evaluate(read(run), read(there / "truth.csv"), max_distance=3000.0, states=read_states(run))["nees"] < 4
@@ -153,13 +148,13 @@ def test_what_nothing_tells_of_biases_is_in_the_errors_of_tracks(biased, monkeyp
     assert not any(own["bias_azimuth_observed"] for own in radars.values())
 
 
-def turned(table, degrees):
-    """Turn a table's azimuths."""
+def changed(table, change):
+    """Write a table of plots again, with `change` of each row."""
     rows = list(csv.DictReader(table.open()))
     with table.open("w") as file:
         written = csv.DictWriter(file, rows[0])
         written.writeheader()
-        written.writerows(row | {"azimuth_deg": (float(row["azimuth_deg"]) + degrees) % 360} for row in rows)
+        written.writerows(row | change(row) for row in rows)
 
 
 def test_tracks_that_a_bias_keeps_apart_are_told_of(biased, tmp_path, caplog):

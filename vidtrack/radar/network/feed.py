@@ -79,6 +79,11 @@ class Feed:
         return self.found.sensor.locate(self.found.z, self.found.R)[0][:, :2]
 
     @property
+    def sigma(self) -> Floats:
+        """(2,) usual standard deviations of ranges [m] and azimuths [rad]."""
+        return np.asarray(np.median(self.plots.sigma[:, :2], axis=0))
+
+    @property
     def span_s(self) -> tuple[float, float]:
         """The times of the first and last plot."""
         return float(self.plots.time_s.min()), float(self.plots.time_s.max())
@@ -187,7 +192,7 @@ def _how_late(later_s: float) -> str:
 def _as_measured(feed: Feed) -> Measured:
     plots = feed.plots
     azimuth = plots.z[:, 1] - feed.placed.turned
-    return Measured(plots.time_s, plots.z[:, 0], azimuth, np.median(plots.sigma[:, :2], axis=0), feed.scan_s)
+    return Measured(plots.time_s, plots.z[:, 0], azimuth, feed.sigma, feed.scan_s)
 
 
 def _refuse_idle(feeds: Sequence[Feed], radars: Radars, settings: RadarSettings) -> None:

@@ -56,7 +56,8 @@ class Network:
         if len(feeds) == 1:
             sigma[:] = 0.0
         self._told_s = -np.inf
-        self._R = np.array([np.diag(np.median(feed.plots.sigma[:, :2], axis=0) ** 2) for feed in feeds])
+        self._coverages = [feed.coverage for feed in feeds]
+        self._R = np.array([np.diag(feed.sigma**2) for feed in feeds])
         self.registration = self._expected = self._registration(sigma)
         unexpected = sigma[:, :2].any(axis=1) & (sigma[:, 2] == 0)
         unexpected[0] = False
@@ -100,7 +101,8 @@ class Network:
         """The tracks with what is not known of the biases in their covariances."""
         if not len(tracks) or not self.registration.cov.any():
             return tracks
-        return with_untold(tracks, self.registration, [feed.coverage.share(tracks.xy) for feed in self.feeds], self._R)
+        covered = [coverage.share(tracks.xy) for coverage in self._coverages]
+        return with_untold(tracks, self.registration, covered, self._R)
 
     def learn(self, turn: Turn, tracks: Tracks) -> None:
         """Learn the biases from the plots that confirmed tracks took in this scan, unless it has told them already."""
@@ -137,7 +139,7 @@ class Network:
 
         Another one names each radar whose clock is off, though no error of it is expected.
         """
-        if self.registration.used < np.count_nonzero(self.registration.prior):
+        if not self.registration.told:
             _log.warning(
                 "hardly any target of two radars told their biases: were there none at one time, or are the places and "
                 "directions of %s wrong?", names(self.feeds),
