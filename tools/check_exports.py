@@ -2,10 +2,10 @@
 
     python tools/check_exports.py RUN --peers-in DIR [--site SITE.toml]
 
-RUN is a run at a site with `epsg`, `start` and classes by the names of level-X, at 25 frames/s, which Tactics2D takes
-for granted. The readers are GeoPandas, MovingPandas, SUMO's sumolib and Tactics2D, in environments that pip makes in
-DIR. For .trj there is none that runs here; tests/output/export reads it as SSAM's source does. SUMO has front bumpers,
-all others the middles of the footprints, in longitude and latitude where the format has them.
+RUN is a run at a site with `epsg` and `start`, at 25 frames/s, which Tactics2D takes for granted. The readers are
+GeoPandas, MovingPandas, SUMO's sumolib and Tactics2D, in environments that pip makes in DIR. For .trj there is none
+that runs here; tests/output/export reads it as SSAM's source does. SUMO has front bumpers, all others the middles of
+the footprints, in longitude and latitude where the format has them.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pyproj
 import pytest
-from road_runs import EAST, FPS, NORTH, SITE, usual_ways, way, write_run
+from road_runs import EAST, FPS, NORTH, SITE, hide, usual_ways, way, write_run
 
 from vidtrack.errors import ConfigError
 from vidtrack.output.export import road_run
@@ -149,6 +149,37 @@ def test_level_x_counts_angles_from_east_and_frames_without_a_gap(run, tmp_path,
             assert velocity == pytest.approx((10 * np.cos(toward), 10 * np.sin(toward)), abs=1e-4)
             assert row["xAcceleration"] == ""
     assert found == expected.keys()
+
+
+def level_x_meta(folder, *ways, **more):
+    """The second table of level-X by vidtrack's number of the track."""
+    run = open_road_run(write_run(folder, *ways, **more))
+    export(run, "level-x", folder)
+    return {int(row["vidtrackId"]): row for row in read_csv(folder / "00_tracksMeta.csv")}
+
+
+def test_level_x_has_the_words_of_its_readers_and_vidtrack_s_beside(tmp_path):
+    """Tactics2D ends at another word."""
+    site = SITE[: SITE.index("[classes]")] + "[classes]\nlorry = [9, 12]\nCar = [4, 5]\nPkw = [5, 6.5]\n"
+    ways = [way(k, range(5), length=length) for k, length in enumerate([10.5, 4.5, 5.7, 4.05, 2.1, 0.6, 14.0])]
+    meta = level_x_meta(tmp_path, *ways, site=site)
+    assert [meta[k]["vidtrackClass"] for k in range(7)] == ["lorry", "Car", "Pkw", *["unknown"] * 4]
+    assert [meta[k]["class"] for k in range(7)] == ["truck", "car", "car", "car", "bicycle", "pedestrian", "truck_bus"]
+
+
+def test_level_x_has_the_words_of_its_readers_without_classes_of_the_site(tmp_path):
+    ways = way(1, range(5), length=16.0), way(2, range(5), length=2.0), way(3, range(5), length=0.4)
+    meta = level_x_meta(tmp_path, *ways, site=SITE[: SITE.index("[classes]")])
+    assert [meta[k]["class"] for k in (1, 2, 3)] == ["truck_bus", "bicycle", "pedestrian"]
+
+
+def test_level_x_has_a_usual_size_where_a_track_shows_none(tmp_path):
+    """Tactics2D cannot make a vehicle without a size."""
+    hidden = hide(way(1, range(5)), range(5), "length_m", "length_sigma_m", "width_m")
+    about = level_x_meta(tmp_path, hidden)[1]
+    assert (about["class"], about["vidtrackClass"]) == ("car", "unknown")
+    assert (float(about["length"]), float(about["width"])) == (4.3, 1.75)
+    assert {row["length"] for row in read_csv(tmp_path / "00_tracks.csv")} == {""}
 
 
 def test_sumo_has_front_bumpers_by_time(run, tmp_path, expected):

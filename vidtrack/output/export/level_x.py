@@ -9,12 +9,14 @@ from typing import TextIO
 import numpy as np
 import pyarrow as pa
 
+from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
 from vidtrack.output.export.globe import system_of, to_globe
 from vidtrack.output.export.pieces import Piece, pieces
-from vidtrack.output.export.road_run import RoadRun
+from vidtrack.output.export.road_run import RoadRun, Vehicles
 from vidtrack.output.folder import replacing
 from vidtrack.output.tables import csv_text
+from vidtrack.traffic.vehicles.classes import CLASSES, KINDS
 
 _TRACKS = (
     *("recordingId", "trackId", "frame", "trackLifetime", "xCenter", "yCenter", "heading", "width", "length"),
@@ -23,21 +25,27 @@ _TRACKS = (
 )
 _TRACKS_META = (
     *("recordingId", "trackId", "initialFrame", "finalFrame", "numFrames", "width", "length", "class"),
-    *("vidtrackId", "vidtrackPiece"),
+    *("vidtrackId", "vidtrackPiece", "vidtrackClass"),
 )
 _RECORDING_META = (
     *("recordingId", "locationId", "frameRate", "speedLimit", "weekday", "startTime", "duration"),
     *("numTracks", "numVehicles", "numVRUs", "latLocation", "lonLocation", "xUtmOrigin", "yUtmOrigin"),
     "orthoPxToMeter",
 )
+_WORDS = {
+    **{word: word for word in ("car", "van", "truck", "bus", "truck_bus", "trailer")},
+    **{word: word for word in ("motorcycle", "bicycle", "pedestrian")},
+    **{"lorry": "truck", "lorry or bus": "truck_bus", "motorcycle or bicycle": "bicycle", "person": "pedestrian"},
+}
+"""The data sets' word for each class; readers refuse others."""
 _RECORDING = 0
 
 
 def write(run: RoadRun, folder: Path) -> None:
     """Write 00_tracks.csv, 00_tracksMeta.csv and 00_recordingMeta.csv.
 
-    A `trackId` is that of a piece: readers count on frames without a gap. What is not known is an empty cell. Raises
-    ConfigError for a source without a frame rate.
+    A `trackId` is that of a piece: readers count on frames without a gap. What is not known is an empty cell, but for
+    class and size of a whole track. Raises ConfigError for a source without a frame rate.
     """
     if not run.fps:
         raise ConfigError(f"level-x needs a frame rate, and the source of {run.folder} has none")
@@ -53,7 +61,7 @@ def write(run: RoadRun, folder: Path) -> None:
         number, last = -1, 0
         for number, piece in enumerate(pieces(run)):
             _write_track(tracks, number, piece)
-            rows.writerow(_meta(number, piece))
+            rows.writerow(_meta(number, piece, run.vehicles))
             last = max(last, int(piece.rows.frame[-1]))
     with replacing(folder / "00_recordingMeta.csv") as path, path.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows([_RECORDING_META, _recording(run, number + 1, last)])
@@ -80,16 +88,20 @@ def _rounded(column: np.ndarray) -> np.ndarray:
     return np.round(column, 5) if column.dtype.kind == "f" else column
 
 
-def _meta(number: int, piece: Piece) -> tuple[object, ...]:
-    rows = piece.rows
-    sides = (_mean(rows.width), _mean(rows.length))
+def _meta(number: int, piece: Piece, vehicles: Vehicles) -> tuple[object, ...]:
+    """Readers need a class that they know and a size: else those of the likeliest class."""
+    rows, (row,) = piece.rows, vehicles.row(np.array([piece.track]))
+    likeliest = str(vehicles.likeliest[row])
+    length, width, _ = KINDS[CLASSES.index(likeliest)].mean
+    sides = (_mean(rows.width, width), _mean(rows.length, length))
     frames = (int(rows.frame[0]), int(rows.frame[-1]), len(rows))
-    return (_RECORDING, number, *frames, *sides, piece.kind, piece.track, piece.number)
+    word = _WORDS.get(piece.kind.lower(), _WORDS[likeliest])
+    return (_RECORDING, number, *frames, *sides, word, piece.track, piece.number, piece.kind)
 
 
-def _mean(values: np.ndarray) -> float | str:
+def _mean(values: Floats, usual: float) -> float:
     known = values[np.isfinite(values)]
-    return round(float(known.mean()), 3) if len(known) else ""
+    return round(float(known.mean()), 3) if len(known) else usual
 
 
 def _recording(run: RoadRun, tracks: int, last: int) -> tuple[object, ...]:

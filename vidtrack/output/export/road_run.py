@@ -86,16 +86,18 @@ class Rows:
 class Vehicles:
     """The T tracks of a run that have positions, in order of their numbers.
 
-    track    (T,)
-    until    (T,) the last frame in which the track was seen; what follows is a guess that nothing confirmed
-    length   (T,) m; NaN where it is not known
-    kind     (T,) class of the whole track, as `vidtrack measure` has it
+    track     (T,)
+    until     (T,) the last frame in which the track was seen; what follows is a guess that nothing confirmed
+    length    (T,) m; NaN where it is not known
+    kind      (T,) class of the whole track, as `vidtrack measure` has it
+    likeliest (T,) of vidtrack's own classes the likeliest one, however unsure
     """
 
     track: Ints
     until: Ints
     length: Floats
     kind: np.ndarray
+    likeliest: np.ndarray
 
     def row(self, track: Ints) -> Ints:
         """(N,) where tracks (N,) are in these arrays."""
@@ -225,8 +227,9 @@ class _FirstLook:
         track, index = np.unique(parts[:, 0], return_inverse=True)
         until = np.full(len(track), -1)
         np.maximum.at(until, index, parts[:, 1])
-        named = whole.named(track)
-        return Vehicles(track, until, named.length, np.array([name or UNKNOWN for name in named.kind]))
+        named, likeliest = whole.named(track)
+        kind = np.array([name or UNKNOWN for name in named.kind])
+        return Vehicles(track, until, named.length, kind, np.array(likeliest))
 
 
 def _known(table: pa.Table) -> Mask:

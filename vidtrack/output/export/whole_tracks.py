@@ -13,7 +13,7 @@ from vidtrack.traffic.lengths import add_lengths, mean_length
 from vidtrack.traffic.measures.blocks import side_by_side
 from vidtrack.traffic.measures.rows import BOX, numbers_of, states, uncut_edges
 from vidtrack.traffic.site import Site
-from vidtrack.traffic.vehicles.naming import Named, whole_tracks
+from vidtrack.traffic.vehicles.naming import Named, likeliest, whole_tracks
 from vidtrack.traffic.vehicles.vehicles import Vehicles
 
 
@@ -38,9 +38,10 @@ class WholeTracks:
         add_lengths(self._sums, track, column["length_m"], column["length_sigma_m"], hidden)
         self._vehicles.add(track, t, side_by_side(table, ("x_m", "y_m")), uncut_edges(table, self._size))
 
-    def named(self, track: Ints) -> Named:
-        """Of tracks (T,)."""
+    def named(self, track: Ints) -> tuple[Named, list[str]]:
+        """Of tracks (T,), and the likeliest of `classes.CLASSES`, however unsure."""
         nothing = np.empty(0, np.int64)
         found = self._vehicles.fitted(np.arange(len(self._sums)), nothing, np.empty(0))
         classes = None if found is None else found.classes.of(track)
-        return whole_tracks(classes, *mean_length(self._sums[track]), self._classes)
+        lengths = mean_length(self._sums[track])
+        return whole_tracks(classes, *lengths, self._classes), likeliest(classes, *lengths)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.lengths import UNKNOWN, length_terms, mean_length
-from vidtrack.traffic.vehicles.classes import Classified, classified, named, named_by_length
+from vidtrack.traffic.vehicles.classes import CLASSES, Classified, classified, named, named_by_length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +41,23 @@ def whole_tracks(
     return Named(length, *named(found))
 
 
+def likeliest(found: Classified | None, length: Floats, sigma: Floats) -> list[str]:
+    """(T,) of `classes.CLASSES` the likeliest of each whole track, however unsure; arguments as in `whole_tracks`."""
+    probability = _by_length(length, sigma, np.zeros(len(length))).probability
+    if found is not None:
+        probability = np.where(np.isnan(found.probability), probability, found.probability)
+    return [CLASSES[k] for k in probability.argmax(axis=1).tolist()]
+
+
+def _by_length(length: Floats, sigma: Floats, speed: Floats) -> Classified:
+    """Vehicles of lengths (T,) and standard deviations (T,) m, NaN where they are not known, at speeds (T,) m/s."""
+    known = np.isfinite(length)
+    about, vector = np.zeros((len(length), 3, 3)), np.zeros((len(length), 3))
+    about[known, 0, 0] = 1 / sigma[known] ** 2
+    vector[known, 0] = length[known] / sigma[known] ** 2
+    return classified(about, vector, speed)
+
+
 class Naming:
     """Takes rows in order of time; remembers the sums over each track that is still there.
 
@@ -69,10 +86,7 @@ class Naming:
     def _class_of(self, mean: Floats, sigma: Floats, speed: Floats) -> list[str]:
         if self._classes:
             return named_by_length(mean, sigma, self._classes)[0]
-        about = np.zeros((len(mean), 3, 3))
-        about[:, 0, 0] = 1 / sigma**2
-        vector = np.column_stack([mean / sigma**2, np.zeros((len(mean), 2))])
-        return [name or UNKNOWN for name in named(classified(about, vector, speed))[0]]
+        return [name or UNKNOWN for name in named(_by_length(mean, sigma, speed))[0]]
 
     def _added(self, track: Ints, terms: Floats) -> Floats:
         """(N, K) sums of the terms (N, K) of each track to each row; those of tracks that are gone are forgotten."""
