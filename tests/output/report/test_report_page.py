@@ -239,6 +239,29 @@ def test_what_the_command_refuses(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(("seconds", "said"), [(10, "10 s"), (90, "90 s"), (60, "1 min"), (900, "15 min")])
+def test_the_page_says_how_long_intervals_are(tmp_path, unpainted, monkeypatch, seconds, said):
+    monkeypatch.setattr("made_up_day.INTERVAL_S", float(seconds))
+    assert f"in intervals of {said} " in words(report(write_day(tmp_path / "day", [1, 2])))
+
+
+def test_a_site_with_zones_alone_has_a_report(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_run(tmp_path / "run", 20.0)
+    text = SITE.format(name="yard", calibration="")
+    head, zones = text[: text.index("[gates")], text[text.index("[zones") : text.index("[movements]")]
+    (tmp_path / "site.toml").write_text(head + zones)
+    cli.main(["measure", "run", "--site", "site.toml", "-o", "measures", "-q"], standalone_mode=False)
+    command("measures", "-o", "out")
+    page = words(tmp_path / "out")
+    assert "Left out: the site has no gates. Stays in its zones are in the table stays of vidtrack measure." in page
+    assert not (tmp_path / "out" / "checks.csv").exists()
+    heat = table(tmp_path / "out" / "heat_map.csv")
+    assert sum(float(row["vehicle_seconds"]) for row in heat) > 0
+    with pytest.raises(ConfigError, match="utdf holds turning counts, and the site yard has no entry gate"):
+        cli.main(["export", "measures", "--as", "utdf", "-o", "volumes"], standalone_mode=False)
+
+
 def test_from_a_run_to_its_report(tmp_path, monkeypatch):
     """Two vehicles: one drives from the north to the south, one stands aside. Somebody looked at one crossing."""
     monkeypatch.chdir(tmp_path)

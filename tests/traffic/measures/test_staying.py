@@ -7,7 +7,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
-from drawn_runs import CALIBRATED, SIZE, along, site, straight, write_run
+from drawn_runs import CALIBRATED, SITE, SIZE, along, site, straight, write_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -43,6 +43,24 @@ def test_without_a_calibration_standing_is_not_known(tmp_path):
     tables = measured([run], site(**ZONES)).tables
     assert tables["stays"].to_pylist()[0]["standing_s"] is None
     assert len(tables["queues"]) == 0
+
+
+@pytest.mark.parametrize("tree", [CALIBRATED, SITE], ids=["metres", "px"])
+def test_a_site_with_zones_alone_has_stays(tmp_path, tree):
+    """The same as with gates; of what needs gates there is nothing, and who came and went between them is not known."""
+    run = write_run(tmp_path / "run", [stopping(1, 2.0, 300, 5.0), straight(2, 9.0, 50, 300, 100, 5)], metres=True)
+    whole = measured([run], site(tree | ZONES)).tables
+    alone = measured([run], site({name: tree[name] for name in tree if name != "gates"} | ZONES)).tables
+    assert alone.keys() == whole.keys()
+    assert alone["stays"].equals(whole["stays"])
+    assert len(alone["stays"]) == 2
+    for name in ("crossings", "trips", "intervals", "queues"):
+        assert len(alone[name]) == 0
+        assert alone[name].schema == whole[name].schema
+    assert alone["checks"].select(["begin_s", "coverage"]).equals(whole["checks"].select(["begin_s", "coverage"]))
+    assert alone["checks"]["appeared"].null_count == len(alone["checks"])
+    if "conflicts" in whole:
+        assert alone["conflicts"].equals(whole["conflicts"])
 
 
 def test_who_is_there_at_the_end_has_not_left(tmp_path):

@@ -43,6 +43,11 @@ def write(found: Findings, folder: Path) -> str:
         )
     where = drawn(found.site)
     sheet = sheet_of(found, turns(where))
+    if not sheet.movements:
+        raise ConfigError(
+            f"utdf holds turning counts, and the site {found.site.camera.name} has no entry gate with an exit gate on "
+            "another leg; draw them and measure again"
+        )
     ways = approaches(found, where, {movement.start for movement in sheet.movements})
     columns = [f"{way}{letter}" for way in _FOUR for letter in "LTR"]
     count = {name: np.zeros(len(found.coverage)) for name in columns}

@@ -110,7 +110,7 @@ def rendered(page: Page, drawn: Mapping[str, bytes], missing: Mapping[str, str])
         missing=missing,
         groups=[(leg, len(list(ours))) for leg, ours in groupby(page.sheet.movements, lambda one: one.start)],
         destinations=list(dict.fromkeys(to for row in page.origins.values() for to in row)),
-        interval_min=float(found.edges[1] - found.edges[0]) / 60,
+        interval=_interval(float(found.edges[1] - found.edges[0])),
         watched=_duration(float(report["watched_s"])),
         interval_share=float(report["watched_s"]) / float(found.edges[-1] - found.edges[0]),
         complete=complete,
@@ -130,6 +130,10 @@ def _share(value: float) -> str:
     if 0 < percent < 1 or 99 < percent < 100:
         return f"{percent:.1f} %"
     return f"{percent:.0f} %"
+
+
+def _interval(seconds: float) -> str:
+    return f"{seconds:g} s" if seconds % 60 else f"{seconds / 60:.0f} min"
 
 
 def _duration(seconds: float) -> str:

@@ -74,6 +74,7 @@ def _missing(page: Page, gone: str) -> dict[str, str]:
     no_metres = "" if page.found.metres else "without a calibration nobody knows whether a vehicle stands"
     no_queue = "" if any((leg.queue > 0).any() for leg in page.legs) else "no vehicle was seen to queue"
     no_speed = "no speed was measured: without a calibration only sections with a length give speeds"
+    no_speed = no_speed if page.found.site.gates else "the site has no gates, where speeds are measured"
     ways = None if page.paths is None else page.paths.ways
     reasons = {
         "turning_movements": no_movement,

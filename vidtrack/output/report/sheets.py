@@ -50,7 +50,8 @@ def write_sheets(folder: Path, page: Page) -> None:
         header = ["kind", "conflicts", "with_ttc", "with_pet", "least_ttc_s", "least_pet_s"]
         write_sheet(folder / "conflicts.csv", header, (_known(astuple(kind)) for kind in page.close.kinds))
     write_sheet(folder / "coverage.csv", ["begin", "end", "coverage"], when)
-    write_sheet(folder / "checks.csv", ["check", "meaning", "vehicles"], page.checks)
+    if found.site.gates:
+        write_sheet(folder / "checks.csv", ["check", "meaning", "vehicles"], page.checks)
     if page.reviewed is not None:
         _write_reviewed(folder, page.reviewed)
     if page.paths is not None:

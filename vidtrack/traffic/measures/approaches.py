@@ -26,6 +26,8 @@ _PARKED_S = 180.0
 
 def approaches(standing: Stays, gates: Gates, passed: Passed, trips: Trips, lives: Lives) -> Ints:
     """(E,) the entry gate by which each vehicle that stands comes, or will come; -1: by none, or it has left."""
+    if not len(gates):
+        return np.full(len(standing.vehicle), -1)
     who, entered = standing.vehicle, trips.entry >= 0
     gate, left_s = np.full(len(lives.track), -1), np.full(len(lives.track), np.inf)
     gate[trips.vehicle[entered]] = passed.gate[trips.entry[entered]]

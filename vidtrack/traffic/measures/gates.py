@@ -152,9 +152,13 @@ class Gates:
 
 
 def gates_of(site: Site, ground: Ground | None) -> Gates:
-    """Raises ConfigError for a site without gates, and for a gate that is not on the road's plane."""
-    if not site.gates:
-        raise ConfigError(f"the site {site.camera.name} has no gates; draw at least one: [gates.NAME] with a line")
+    """None of a site with zones alone. Raises ConfigError for a site with neither, and for a gate that is not on the
+    road's plane."""
+    if not (site.gates or site.tracked_zones):
+        raise ConfigError(
+            f"the site {site.camera.name} has no gates and no zones; draw at least one: [gates.NAME] with a line, or "
+            "[zones.NAME] with a polygon"
+        )
     lines = {name: _on_road(name, gate, ground) for name, gate in site.gates.items()}
     pieces = [np.column_stack([line[:-1], line[1:]]) for line in lines.values()]
     lengths = [np.hypot(*(piece[:, 2:] - piece[:, :2]).T) for piece in pieces]
@@ -162,8 +166,8 @@ def gates_of(site: Site, ground: Ground | None) -> Gates:
         tuple(lines),
         tuple(gate.leg or name for name, gate in site.gates.items()),
         tuple(gate.role for gate in site.gates.values()),
-        np.concatenate(pieces),
-        np.concatenate([np.cumsum(length) - length for length in lengths]),
+        np.concatenate([np.empty((0, 4)), *pieces]),
+        np.concatenate([np.empty(0), *(np.cumsum(length) - length for length in lengths)]),
         np.cumsum([0, *map(len, pieces)]),
         tuple(_directions(name, gate, ground) for name, gate in site.gates.items()),
     )

@@ -74,6 +74,8 @@ def journeys(
     metres   positions are on the road; else broken tracks are not joined
     allowed  pairs of legs; none: all but turning back
     """
+    if not len(gates):
+        return _nowhere(passed, len(lives.track))
     passed = passed.only(passed.t <= lives.until[passed.track])
     may = _may(gates, allowed)
     needed = ~passed.beside | _needed(gates, passed, may)
@@ -103,6 +105,13 @@ def journeys(
     np.fmax.at(end, vehicle, lives.tail.t)
     trips = _trips(gates, known.passed, vehicle[known.passed.track], begin, end, spans)
     return Journeys(_as_sure(gates, known), joins, vehicle, trips)
+
+
+def _nowhere(passed: Passed, tracks: int) -> Journeys:
+    """Without gates nobody is seen to come or go, so no track is joined to another; `passed` has no passings."""
+    number, time = np.empty(0, int), np.empty(0)
+    trips = Trips(number, number, number, time, time, number > 0, number > 0)
+    return Journeys(Passings(passed, time, number), _NONE, np.arange(tracks), trips)
 
 
 def _because(reason: int, passed: Passed, probability: Floats) -> Passings:

@@ -343,7 +343,7 @@ class _Figures:
         return table(columns | {"reason": ("", words(("seen", "merged"), found.merged.astype(int)))})
 
     def _checks(self) -> pa.Table:
-        found = balance(self.trips, self.edges, self.watched)
+        found = balance(self.trips, self.edges, self.watched * bool(self.gates))  # without gates nothing is known
         return table(
             {
                 **self._when(1),

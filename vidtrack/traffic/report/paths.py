@@ -12,6 +12,7 @@ from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.rows import Reader, Rows
 from vidtrack.traffic.measures.runs import Day, measured_run
+from vidtrack.traffic.measures.staying import outlines_of
 from vidtrack.traffic.report.findings import Findings
 from vidtrack.traffic.report.sheet import Movement, Sheet
 from vidtrack.traffic.report.turns import THROUGH
@@ -21,7 +22,7 @@ WINDOW_S = 300.0
 _CELLS = 120
 """Of the heat map, along its longer side"""
 _BESIDE = 0.25
-"""How far the heat map reaches beyond the gates, as a share of their extent"""
+"""How far the heat map reaches beyond the gates, or the zones where there are none, as a share of their extent"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,8 +70,10 @@ def paths_of(found: Findings, sheet: Sheet) -> Paths:
     sizes = sorted({recording.size for recording in day.recordings})
     drawn = {size: found.site.scaled(*size) for size in sizes}
     grounds = {size: None if one.calibration is None else calibrated(one) for size, one in drawn.items()}
-    gates = gates_of(drawn[sizes[0]], grounds[sizes[0]])
-    reader, heat, window = Reader(day, grounds), _empty(gates), _window(found, sheet)
+    first = drawn[sizes[0]], grounds[sizes[0]]
+    gates = gates_of(*first)
+    corners = gates.segment.reshape(-1, 2) if len(gates) else np.concatenate(outlines_of(*first))
+    reader, heat, window = Reader(day, grounds), _empty(corners), _window(found, sheet)
     kept: list[Rows] = []
     for rows in reader:
         _warm(heat, rows)
@@ -86,8 +89,8 @@ def _day(found: Findings) -> Day:
     return Day(recordings, None if utc is None else datetime.fromisoformat(utc))
 
 
-def _empty(gates: Gates) -> Heat:
-    corners = gates.segment.reshape(-1, 2)
+def _empty(corners: Floats) -> Heat:
+    """A heat map of the place with these corners (N, 2)."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     beside = _BESIDE * (high - low).max()
     low, high = low - beside, high + beside

@@ -30,7 +30,7 @@ class Drawn:
 
 
 def drawn(site: Site) -> Drawn:
-    """Raises ConfigError for a site without gates."""
+    """Raises ConfigError for a site with neither gates nor zones."""
     ground = None if site.calibration is None else calibrated(site)
     gates = gates_of(site, ground)
     first, last = gates.segment[gates.first[:-1], :2], gates.segment[gates.first[1:] - 1, 2:]
@@ -38,7 +38,7 @@ def drawn(site: Site) -> Drawn:
         first, last = first * (1, -1), last * (1, -1)
     middle = (first + last) / 2
     counted = gates.role("entry", "exit", "both")
-    centre = middle[counted if counted.any() else slice(None)].mean(axis=0)
+    centre = middle[counted if counted.any() else slice(None)].mean(axis=0) if len(gates) else np.zeros(2)
     along = last - first
     normal = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
     return Drawn(gates, middle, normal * np.sign(np.sum(normal * (centre - middle), axis=1, keepdims=True)))
