@@ -85,7 +85,7 @@ def _measure(portion: Portion, site: Path | None, folder: Path) -> Mapping[str, 
     from vidtrack.traffic.site import read_site
 
     with portion.runs() as runs:
-        used = site_of(runs) if site is None else site
+        used = site_of(runs, site)
         found, text = measured(runs, read_site(used)), used.read_bytes()
     names = folder_name(portion.site), folder_name(portion.day)
     own = usable(folder / DAYS / names[0] / names[1])

@@ -56,7 +56,7 @@ def command(options: ExportOptions) -> None:
     from vidtrack.output.export.radar_run import RadarRun, open_radar_run
     from vidtrack.output.export.registry import export
     from vidtrack.output.export.road_run import RoadRun, open_road_run
-    from vidtrack.output.folder import open_folder
+    from vidtrack.output.folder import open_folder, refuse_overwriting
     from vidtrack.traffic.report.findings import Findings, read_findings
 
     start_log(options.verbose, options.quiet)
@@ -74,6 +74,7 @@ def command(options: ExportOptions) -> None:
         run = read_findings(options.run)
     else:
         run = open_road_run(options.run, options.site)
+    refuse_overwriting(options.run, options.output)
     folder = open_folder(options.output, f"{options.run.resolve().name}-{options.form}", options.force)
     try:
         said = export(run, options.form, folder)

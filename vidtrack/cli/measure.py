@@ -52,28 +52,31 @@ def command(options: MeasureOptions) -> None:
     from vidtrack.cli.json_file import write_json
     from vidtrack.errors import ConfigError
     from vidtrack.output.figures import write_figures
-    from vidtrack.output.folder import open_folder, replacing
+    from vidtrack.output.folder import open_folder, refuse_overwriting, replacing
     from vidtrack.recording.retention import parts_of
     from vidtrack.run.batch.archive import is_archive
     from vidtrack.traffic.measures.doubts import against
     from vidtrack.traffic.measures.measure import measured
-    from vidtrack.traffic.measures.runs import parts_with_tracks, site_of
+    from vidtrack.traffic.measures.runs import folder_of, parts_with_tracks, site_of
     from vidtrack.traffic.site import read_site
 
     start_log(options.verbose, options.quiet)
     if len(options.runs) == 1 and is_archive(options.runs[0]):
         if options.json_to is not None:
             raise ConfigError("--json is for one day; those of a batch are in days/SITE/DAY/measures.json")
+        refuse_overwriting(Path(options.runs[0]), options.output)
         click.echo(measure_archive(options.runs[0], options.site, options.output, options.force, options.quiet))
         return
     runs = []
     for run in options.runs:
         parts = parts_with_tracks(Path(run), parts_of(Path(run)))
+        for read in (folder_of(run), *parts):
+            refuse_overwriting(read, options.output)
         runs += [str(part) for part in parts] or [run]
-    source = site_of(runs) if options.site is None else options.site
+    source = site_of(runs, options.site)
     site, text = read_site(source), source.read_bytes()
     found = measured(runs, site)
-    first = Path(options.runs[0].partition("@")[0]).resolve()
+    first = folder_of(options.runs[0]).resolve()
     name = f"{first.name}-measures" if options.site is None else options.site.stem
     folder = open_folder(options.output, name, options.force)
     write_figures(folder, found.tables, found.report)
@@ -85,20 +88,23 @@ def command(options: MeasureOptions) -> None:
     if options.json_to is not None:
         write_json(found.report, options.json_to)
     if not options.quiet:
-        click.echo(_told(found.report), err=True)
+        click.echo(_told(found.report, None if site.gates else len(found.tables["stays"])), err=True)
         for doubt in against(found.report):
             click.echo(f"vidtrack: {doubt}", err=True)
     if options.json_to != "-":
         click.echo(folder)
 
 
-def _told(report: dict[str, Any]) -> str:
-    """One line: what was found."""
+def _told(report: dict[str, Any], stays: int | None) -> str:
+    """One line: what was found. `stays`: at a site without gates."""
     wrong = sum(movement["trips"] for movement in report["impossible_movements"])
     conflicts = report["conflicts"]
     close = "no conflicts without a calibration" if conflicts is None else f"{conflicts} conflicts"
+    watched = f"vidtrack: watched {report['watched_s']:.0f} s"
+    if stays is not None:
+        return f"{watched}: {stays} stays in zones; no crossings, trips and queues without gates; {close}"
     return (
-        f"vidtrack: watched {report['watched_s']:.0f} s: {report['crossings']} crossings, "
+        f"{watched}: {report['crossings']} crossings, "
         f"{report['complete_trips']} whole trips of {report['trips']}, {report['joins']} broken tracks joined; "
         f"{wrong} trips over impossible movements, {report['appeared']} vehicles appeared between the gates, "
         f"{report['vanished']} vanished; {close}"

@@ -145,6 +145,15 @@ def test_a_refused_format_leaves_no_folder(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_run_is_not_written_into_itself(tmp_path):
+    run = write_run(tmp_path, *usual_ways())
+    before = sorted(path.name for path in run.iterdir())
+    with pytest.raises(Error, match="is what is to be read") as refused:
+        export(run, "--as", "geoparquet", "-o", tmp_path / "." / "run", "--force")
+    assert refused.value.exit_code == 2
+    assert sorted(path.name for path in run.iterdir()) == before
+
+
 def test_a_folder_in_use_stays_as_it_is(tmp_path):
     run = write_run(tmp_path, *usual_ways())
     (tmp_path / "out").mkdir()

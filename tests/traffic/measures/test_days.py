@@ -257,8 +257,73 @@ def test_a_run_that_is_given_twice_is_not_counted_twice(tmp_path):
     run = write_run(tmp_path / "a", [straight(1, 2.0, 50, 240, 100, 5)])
     with pytest.raises(ConfigError, match="a is given twice"):
         measured([run, f"{tmp_path}/./a/"], site())
-    day = measured([f"{run}@2026-06-01T07:00:00Z", f"{run}@2026-06-01T08:00:00Z"], site())
-    assert day.tables["trips"].num_rows == 2
+    with pytest.raises(ConfigError, match="a is given twice"):
+        measured([f"{run}@2026-06-01T07:00:00Z", f"{run}@2026-06-01T08:00:00Z"], site())
+    (tmp_path / "link").symlink_to(run)
+    with pytest.raises(ConfigError, match="link is given twice"):
+        measured([run, f"{tmp_path / 'link'}@2026-06-01T08:00:00Z"], site())
+
+
+def told(run, **more):
+    """The same run, whose summary.json says more."""
+    path = Path(run) / "summary.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | more))
+    return run
+
+
+@pytest.mark.parametrize(
+    ("why", "words"), [("interrupted", "a was interrupted"), ("truncated", "a is of a video that is cut short")]
+)
+def test_after_a_run_that_ended_early_the_time_of_the_next_one_is_asked_for(tmp_path, why, words):
+    a, b = (write_run(tmp_path / name, [straight(1, 2.0, 50, 240, 100, 5)], seconds=10) for name in "ab")
+    told(a, **{why: True})
+    with pytest.raises(ConfigError, match=rf"{words}, so nobody knows when .*b begins; write .*b@TIME") as refused:
+        measured([a, b], site())
+    assert refused.value.exit_code == 2
+    assert "\n" not in str(refused.value)
+    rows = measured([a, f"{b}@2026-06-01T07:01:00+02:00"], site()).tables["crossings"].to_pylist()
+    assert [row["time_s"] for row in rows if row["gate"] == "west"] == [2.5, 62.5]
+    rows = measured([b, a], site()).tables["crossings"].to_pylist()  # nothing follows
+    assert [row["time_s"] for row in rows if row["gate"] == "west"] == [2.5, 12.5]
+
+
+def test_parts_of_a_live_run_that_was_interrupted_know_their_times(tmp_path):
+    whole = write_run(tmp_path / "whole", [straight(1, 2.0, 50, 240, 100, 5)], began=BEGAN)
+    parts = [told(part, interrupted=True) for part in parts_of(whole, 30)]
+    assert measured(parts, site()).report["watched_s"] == 60
+
+
+def test_runs_of_sites_of_several_names_are_told_of(tmp_path, vidtrack):
+    """--site stands for all of them, and may be another place's."""
+    runs = [write_run(tmp_path / name, [], seconds=10) for name in "abc"]
+    for run, name in zip(runs, ("mill", "mill", "bridge"), strict=True):
+        told(run, settings={"source": {}, "output": {"site": "site.toml"}})
+        (Path(run) / "site.toml").write_text(TOML.format(name=name, gate=Path(run).name))
+    (tmp_path / "site.toml").write_text(TOML.format(name="yard", gate="g"))
+    code, _, err = vidtrack("measure", "a", "b", "c", "--site", "site.toml", "-o", "out")
+    assert code == 0, err
+    (warning,) = [line for line in err.splitlines() if "warning" in line]
+    assert "sites of several names, a at mill and c at bridge; here they are taken for one place" in warning
+    code, _, err = vidtrack("measure", "a", "b", "--site", "site.toml", "-o", "other")
+    assert code == 0, err
+    assert "warning" not in err
+
+
+@pytest.mark.parametrize("run", ["cam", "cam/2026-06-01T05-00-30Z", "./cam@2026-06-01T07:00:00Z"])
+def test_measures_are_not_written_into_a_run_that_is_read(tmp_path, run, vidtrack):
+    """Its site.toml says what its metres are by."""
+    whole = write_run(tmp_path / "whole", [straight(1, 2.0, 50, 240, 100, 5)], began=BEGAN)
+    (tmp_path / "cam").mkdir()
+    for part, name in zip(parts_of(whole, 30), ("2026-06-01T05-00-00Z", "2026-06-01T05-00-30Z"), strict=True):
+        Path(part).rename(tmp_path / "cam" / name)
+    folder = run.removeprefix("./").partition("@")[0]
+    (tmp_path / folder / "site.toml").write_text("as it was")
+    (tmp_path / "site.toml").write_text(TOML.format(name="a", gate="g"))
+    read = run if "@" in run else "cam"
+    code, out, err = vidtrack("measure", read, "--site", "site.toml", "-o", folder, "--force")
+    assert (code, out) == (2, "")
+    assert err == f"vidtrack: {folder} is what is to be read; choose another place for the results\n"
+    assert (tmp_path / folder / "site.toml").read_text() == "as it was"
 
 
 def test_the_folder_above_the_parts_stands_for_them(tmp_path, vidtrack):
@@ -394,7 +459,7 @@ TOML = '[site]\nname = "{name}"\nwidth = 640\nheight = 480\n[gates."{gate}"]\nli
     [
         (TOML.format(name="a", gate="<b>x,y</b>"), "letters, digits, spaces"),
         (TOML.format(name="=1+1", gate="g"), "letters, digits, spaces"),
-        ('[site]\nname = "a"\nwidth = 640\nheight = 480\n', "has no gates"),
+        ('[site]\nname = "a"\nwidth = 640\nheight = 480\n', "has no gates and no zones; draw at least one"),
         (TOML.format(name="a", gate="g").replace("640", "650"), "not the same shape"),
     ],
     ids=["a tag", "a formula", "no gates", "another picture"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import logging
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -18,12 +19,16 @@ import numpy as np
 from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.traffic.metres import SITE_COPY
+from vidtrack.traffic.site import read_site
 
+_log = logging.getLogger(__name__)
 _JOINED_S = 1.0
 """Parts of one live run with less between them are watched without a break."""
 _CLOCK_S, _CLOCK_SHARE = 5.0, 1e-4
 """s, and share of the time since: by so much the clock that a live run tells its beginning by may have been set"""
 _ROUNDING_S = 1e-3
+_EARLY = {"interrupted": "was interrupted", "truncated": "is of a video that is cut short"}
+"""Words for what summary.json says of a run that ended before its video should"""
 _LONGEST_LINE = 1 << 16
 """Octets at the end of a table that hold its last line"""
 _NO_RUN = "{} is not a finished run: it has no tracks.parquet and no tracks.csv"
@@ -83,7 +88,11 @@ class Day:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """A run as its folder and the user describe it, in its own time_s; `zero`: the time of time_s 0."""
+    """A run as its folder and the user describe it, in its own time_s.
+
+    zero   the time of time_s 0
+    early  why it ended before its video did; "": it did not
+    """
 
     folder: Path
     size: tuple[int, int]
@@ -93,6 +102,7 @@ class _Found:
     end_s: float
     breaks: tuple[tuple[float, float], ...]
     rim_px: float
+    early: str
 
 
 def open_day(runs: Sequence[str], start: datetime | None) -> Day:
@@ -101,13 +111,12 @@ def open_day(runs: Sequence[str], start: datetime | None) -> Day:
     start  time of the first picture of the first run that does not tell it
 
     A live run tells its time (`began` in summary.json), TIME that of a run's `time_s` 0. A run without either begins
-    where the one before it in the list ends. Raises ConfigError for runs of radar, two at the same time and times that
-    cannot be read, SourceError where there is no run.
+    where the one before it in the list ends. Raises ConfigError for runs of radar, one that is given twice, two at the
+    same time, times that cannot be read and those that are not known, SourceError where there is no run.
     """
     found = [_found(run) for run in runs]
-    for k, one in enumerate(found):
-        if one.zero is None and any(one.folder.samefile(other.folder) for other in found[:k]):
-            raise ConfigError(f"{one.folder} is given twice; its vehicles would be counted twice")
+    _refuse_twice(found)
+    _refuse_after_early(found)
     zeros = [one.zero for one in found]
     if zeros[0] is None:
         if start is None and any(zeros):
@@ -129,6 +138,11 @@ def open_day(runs: Sequence[str], start: datetime | None) -> Day:
         recordings.append(Recording(one.folder, one.size, offset, begin, end, session, one.breaks, one.rim_px))
     recordings.sort(key=lambda one: one.end_s)
     return Day(tuple(_apart(recordings)), utc)
+
+
+def folder_of(run: str) -> Path:
+    """Of a run written as for `open_day`."""
+    return _split(run)[0]
 
 
 def has_tracks(folder: Path) -> bool:
@@ -164,12 +178,17 @@ def parts_with_tracks(run: Path, parts: Sequence[Path]) -> list[Path]:
     return opened
 
 
-def site_of(runs: Sequence[str]) -> Path:
-    """The site that runs were tracked with: the copy in their folders, each written as for `open_day`.
+def site_of(runs: Sequence[str], given: Path | None = None) -> Path:
+    """The site to measure runs at: the copy in their folders, each written as for `open_day`.
+
+    given  the site for all of them, whatever they were tracked with
 
     Raises ConfigError where a run has none, or another one than the first, SourceError where there is no run.
     """
-    copies = [_split(run)[0] / SITE_COPY for run in runs]
+    if given is not None:
+        _tell_of_places(runs)
+        return given
+    copies = [folder_of(run) / SITE_COPY for run in runs]
     for copy in copies:
         if not has_tracks(copy.parent):
             raise SourceError(_NO_RUN.format(copy.parent))
@@ -184,6 +203,21 @@ def site_of(runs: Sequence[str]) -> Path:
     return copies[0]
 
 
+def _tell_of_places(runs: Sequence[str]) -> None:
+    """Warn of runs that were tracked at sites of several names."""
+    copies: dict[bytes, Path] = {}
+    for copy in (folder_of(run) / SITE_COPY for run in runs):
+        if copy.is_file() and _had_site(copy.parent):
+            copies.setdefault(copy.read_bytes(), copy)
+    named: dict[str, Path] = {}
+    for copy in copies.values():
+        with suppress(ConfigError):  # of another version; it is not needed
+            named.setdefault(read_site(copy).camera.name, copy.parent)
+    if len(named) > 1:
+        places = " and ".join(f"{folder} at {name}" for name, folder in named.items())
+        _log.warning("the runs were tracked at sites of several names, %s; here they are taken for one place", places)
+
+
 def _had_site(folder: Path) -> bool:
     """Whether the run was tracked with a site; a folder that is used again may hold that of another run."""
     try:
@@ -191,6 +225,24 @@ def _had_site(folder: Path) -> bool:
     except (OSError, KeyError, TypeError, ValueError):
         return True  # another check says what is wrong with the folder
     return output.get("site") is not None
+
+
+def _refuse_twice(found: Sequence[_Found]) -> None:
+    folders: set[Path] = set()
+    for one in found:
+        if one.folder.resolve() in folders:
+            raise ConfigError(f"{one.folder} is given twice; its vehicles would be counted twice")
+        folders.add(one.folder.resolve())
+
+
+def _refuse_after_early(found: Sequence[_Found]) -> None:
+    """Refuse a run without a time after one that ended early: nobody knows when that would have ended."""
+    for before, one in pairwise(found):
+        if before.early and one.zero is None:
+            raise ConfigError(
+                f"{before.folder} {before.early}, so nobody knows when {one.folder} begins; write {one.folder}@TIME, "
+                "for example 2026-06-01T08:00:00+02:00"
+            )
 
 
 def _sessions(found: list[_Found]) -> list[int]:
@@ -221,6 +273,7 @@ def _found(run: str) -> _Found:
         source = summary["settings"]["source"]
         spans = [(float(first), float(last)) for first, last in summary.get("watched", [])]  # earlier versions: none
         rim = float(summary.get("rim_px", 0.0))
+        early = next((words for name, words in _EARLY.items() if summary.get(name)), "")
     except OSError:
         raise SourceError(f"{folder} has no summary.json, so nobody knows when it watched") from None
     except (KeyError, TypeError, ValueError):
@@ -235,7 +288,7 @@ def _found(run: str) -> _Found:
     if began:  # a part of a live run begins somewhere in it
         begin = spans[0][0] if spans else end - (frames - 1) / fps
     breaks = tuple((before[1] + 1 / fps, after[0]) for before, after in pairwise(spans))
-    return _Found(folder, size, zero, bool(began), min(begin, end), end + 1 / fps, breaks, rim)
+    return _Found(folder, size, zero, bool(began), min(begin, end), end + 1 / fps, breaks, rim, early)
 
 
 def ended(folder: Path) -> bool:
