@@ -113,6 +113,9 @@ BAD = {
     "system in degrees": ("camera_height_m = 8.0", "epsg = 4326", "the system WGS 84 does not measure in metres"),
     "system in degrees, of degrees": ("camera_height_m = 8.0", "geographic = true\nepsg = 4326", "WGS 84 does not"),
     "lens without focal length": ("camera_height_m = 8.0", "distortion = [0.1, 0]", "needs focal_px"),
+    "lens without a name": ("camera_height_m = 8.0", 'distortion = "auto"', 'give [k1, k2], or "fit" for k1'),
+    "lens of one number": ("camera_height_m = 8.0", "distortion = [0.1]", 'give [k1, k2], or "fit" for k1'),
+    "lens of four points": ("camera_height_m = 8.0", 'distortion = "fit"', "needs at least 6 pairs of points"),
     "both kinds": ("camera_height_m = 8.0", "lengths = [[[0, 0], [0, 9], 3.0]]", "and not both"),
     "no section but a value": ("[report]", "[sections]\nmain = 3\n[report]", "not valid TOML"),
 }

@@ -112,6 +112,7 @@ def _draw(folder: Path, site: Site, picture: Image | None, result: Account) -> N
 
 def _print(report: dict[str, Any]) -> None:
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     from vidtrack.traffic.measures.doubts import sayings
@@ -144,8 +145,15 @@ def _print(report: dict[str, Any]) -> None:
             f"The camera is {camera['height_m']:.2f} m above the road (standard deviation "
             f"{camera['height_sigma_m']:.2f} m); its focal length is {camera['focal_px']:.0f} px."
         )
+    lens = report["lens"]
+    if lens is not None:
+        by_points = f" (standard deviation {lens['corner_sigma_px']:.1f} px)" if lens["k1_sigma"] else ""
+        console.print(
+            f"The lens moves the farthest corner of the picture by {lens['corner_px']:+.1f} px{by_points}: k1 = "
+            f"{lens['k1']:.3f}, k2 = {lens['k2']:.3f}."
+        )
     if "traffic" in report:
         for saying in sayings(report["traffic"]):
             console.print(f"{saying.found[0].upper()}{saying.found[1:]}.")
     for line in report["warnings"]:
-        console.print(f"[bold]Note:[/bold] {line}")
+        console.print(f"[bold]Note:[/bold] {escape(line)}")

@@ -27,6 +27,8 @@ from vidtrack.traffic.epsg import metric_system, refuse_untrue
 from vidtrack.traffic.lengths import apart
 from vidtrack.traffic.shapes import Bounds, Line, Name, Point, Polygon, Positive, Segment, written
 
+LEAST_FOR_LENS = 6
+"""Pairs of points that a lens can be fitted to, with something left to check it with."""
 _FARTHEST_M = 1e8
 _ASPECT_PX = 1.0  # what rounding to whole pixels may do to a picture's height
 
@@ -69,8 +71,9 @@ class Calibration(Group):
     """`ground` holds longitudes and latitudes"""
     epsg: Annotated[int, Field(gt=0), AfterValidator(_metric)] | None = None
     """metric coordinate system of `ground`, or the one that longitudes and latitudes are brought into"""
-    distortion: tuple[float, float] | None = None
-    """k1, k2 of the lens (Brown-Conrady, on normalised coordinates); None: straight lines are straight"""
+    distortion: tuple[float, float] | Literal["fit"] | None = None
+    """k1, k2 of the lens (Brown-Conrady, on normalised coordinates); "fit": k1 from the points; None: straight lines
+    are straight"""
     focal_px: float | None = Field(None, gt=0)
     """px; focal length; None: from the points, with square pixels"""
     center: Point | None = None
@@ -81,6 +84,15 @@ class Calibration(Group):
     """px; segments along a straight road, at least 2"""
     across: tuple[Segment, ...] = ()
     """px; segments square to them, at least 2 where the focal length is not given"""
+
+    @field_validator("distortion", mode="before")
+    @classmethod
+    def _two_numbers(cls, value: object) -> object:
+        numbers = list(value) if isinstance(value, (list, tuple)) else []
+        two = len(numbers) == 2 and all(isinstance(k, (int, float)) and not isinstance(k, bool) for k in numbers)
+        if not (two or value is None or value == "fit"):
+            raise ValueError('give [k1, k2], or "fit" for k1 by the points')
+        return value
 
     @whole(mode="after")
     def _one_kind(self) -> Calibration:
@@ -93,7 +105,9 @@ class Calibration(Group):
             raise ValueError("without ground points at least 2 directions and 1 length are needed")
         elif len(self.across) < 2 and (self.across or self.focal_px is None):
             raise ValueError("give at least 2 segments across, or none and focal_px")
-        if self.distortion is not None and self.focal_px is None:
+        if self.distortion == "fit" and len(self.picture) < LEAST_FOR_LENS:
+            raise ValueError(f'distortion = "fit" needs at least {LEAST_FOR_LENS} pairs of points')
+        if isinstance(self.distortion, tuple) and self.focal_px is None:
             raise ValueError("distortion is on normalised coordinates and needs focal_px")
         return self
 

@@ -11,8 +11,9 @@ from pinhole import POINTS, Pinhole, site_of
 
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.account import examined
-from vidtrack.traffic.calibration.calibrate import calibrated, checked, doubts, pairs_of, solved
+from vidtrack.traffic.calibration.calibrate import Check, calibrated, checked, doubts, road_plane, solved
 from vidtrack.traffic.calibration.lens import Lens
+from vidtrack.traffic.calibration.pairs import pairs_of
 
 CAMERA = Pinhole()
 LOOKED_AT = np.array([[0, 20.0], [-5, 16], [5, 40]])
@@ -62,7 +63,7 @@ def test_errors_have_the_covariance_that_is_given():
     for _ in range(400):
         site = noisy(rng)
         pairs = pairs_of(site)
-        chi2.append(pairs.fit().chi2)
+        chi2.append(pairs.best()[1].chi2)
         with_noise = seen + rng.normal(0, 0.5, seen.shape)
         ground = _ground(site)
         at = ground.metres(with_noise)
@@ -77,12 +78,10 @@ def test_errors_have_the_covariance_that_is_given():
 
 def _ground(site):
     """The road plane with the standard deviations as they are given, whatever chance made of the points."""
-    from vidtrack.traffic.calibration.calibrate import Check, road_plane
-
     pairs = pairs_of(site)
     nothing = np.empty(0)
-    agreed = Check(nothing, nothing, nothing, nothing, nothing, 0.0, 8, (), False)
-    return road_plane(site, pairs, pairs.fit(), agreed)
+    agreed = Check(nothing, nothing, nothing, nothing, nothing, 0.0, 8, (), False, None)
+    return road_plane(site, pairs, solved(pairs), agreed)
 
 
 def test_two_vehicles_share_the_error_of_the_calibration():

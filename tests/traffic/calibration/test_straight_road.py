@@ -111,3 +111,21 @@ BAD = {
 def test_too_few_segments_are_refused(change, words):
     with pytest.raises(ValueError, match=words):
         site_of(**change)
+
+
+def test_segments_that_no_camera_sees_are_refused():
+    """Those along the road meet below it, or are parallel in the picture."""
+    below = {
+        "directions": [[[588, 187], [814, 579]], [[1172, 195], [1004, 623]]],
+        "focal_px": 1100,
+        "lengths": [[[655, 462], [756, 288], 12.0]],
+    }
+    parallel = {
+        "directions": [[[300, 700], [500, 100]], [[700, 700], [900, 100]]],
+        "across": [[[300, 200], [1000, 200]], [[300, 500], [1000, 500]]],
+        "lengths": [[[400, 400], [400, 20], 30.0]],
+    }
+    for wrong in (below, parallel):
+        camera = {"name": "road", "width": WIDTH, "height": HEIGHT}
+        with pytest.raises(ConfigError, match="no camera above the road sees these segments"):
+            calibrated(Site.model_validate({"site": camera, "calibration": wrong}))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.special import chdtri
 
 from vidtrack.arrays.types import Floats
-from vidtrack.traffic.calibration.calibrate import checked, doubts, pairs_of, road_plane, solved
+from vidtrack.traffic.calibration.calibrate import checked, corner_px, doubts, road_plane, solved
 from vidtrack.traffic.calibration.ground import Ground
+from vidtrack.traffic.calibration.pairs import pairs_of
 from vidtrack.traffic.calibration.straight_road import straight_road
 from vidtrack.traffic.footprint import velocity
 from vidtrack.traffic.site import Site
@@ -70,6 +71,8 @@ def examined(site: Site) -> Account:
         "wrong": [i + 1 for i in check.wrong],
         "contradiction": check.contradiction or bool(height),
         "camera": found,
+        "lens": lens_told(ground, site, found),
+        "homography": homography_told(ground),
         "places": places(ground, picture),
         "warnings": doubts(site, check) + height,
     }
@@ -93,6 +96,8 @@ def _without_map(site: Site) -> Account:
         "wrong": [],
         "contradiction": fit.contradiction or bool(height),
         "camera": found,
+        "lens": lens_told(fit.ground, site, found),
+        "homography": homography_told(fit.ground),
         "places": places(fit.ground, picture),
         "warnings": fit.doubts() + height,
     }
@@ -139,6 +144,36 @@ def camera(ground: Ground) -> dict[str, float] | None:
     }
 
 
+def lens_told(ground: Ground, site: Site, found: dict[str, float] | None) -> dict[str, float] | None:
+    """k1 and k2 of the lens in focal lengths of the camera, if it was found, and by how much the picture's corner is
+    moved outwards, with standard deviations where the points told the lens; None without a lens."""
+    lens = ground.lens
+    if lens is None:
+        return None
+    k1_sigma = math.sqrt(ground.cov[8, 8]) if len(ground.cov) > 8 else 0.0
+    focal_px = lens.focal_px if found is None else found["focal_px"]
+    share = (focal_px / lens.focal_px) ** 2
+    corner_sigma_px = abs(corner_px(site, replace(lens, k1=k1_sigma, k2=0.0)))
+    return {
+        "k1": share * lens.k1,
+        "k1_sigma": share * k1_sigma,
+        "k2": share**2 * lens.k2,
+        "focal_px": focal_px,
+        "corner_px": corner_px(site, lens),
+        "corner_sigma_px": corner_sigma_px,
+    }
+
+
+def homography_told(ground: Ground) -> dict[str, Any]:
+    """The matrix from metres, less an origin, to homogeneous picture points without distortion [px], its last element
+    1, and the covariance of the other eight, row by row; then of k1, if the points told the lens."""
+    return {
+        "origin_m": ground.plane.origin.tolist(),
+        "matrix": ground.about_origin.tolist(),
+        "covariance": ground.homography_cov.tolist(),
+    }
+
+
 def height_doubt(found: dict[str, float] | None, stated_m: float | None) -> list[str]:
     """A word about a stated height of the camera that the points contradict."""
     if found is None or stated_m is None:
@@ -156,7 +191,7 @@ def height_doubt(found: dict[str, float] | None, stated_m: float | None) -> list
 def _speed_share(ground: Ground, xy: Floats) -> Floats:
     """(N,) standard deviation that the calibration gives to speeds at picture points, as a share: the worst way."""
     J = ground.px_per_m(ground.metres(xy))
-    changes = np.zeros((2, len(xy), 2, 8))
+    changes = np.zeros((2, len(xy), 2, len(ground.cov)))
     for i, e in enumerate(np.eye(2)):
         for k, (above, below) in enumerate(ground.varied()):
             changes[i, :, :, k] = (velocity(above, xy, xy, J @ e)[0] - velocity(below, xy, xy, J @ e)[0]) / 2

@@ -9,49 +9,21 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
-from vidtrack.arrays.types import Floats
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.ground import Ground
-from vidtrack.traffic.calibration.homography import Fit, Normal, by_k, by_point, depth, fitted, picture_of, plane_of
+from vidtrack.traffic.calibration.homography import Fit, by_point, depth, picture_of, plane_of
 from vidtrack.traffic.calibration.hull import hull
-from vidtrack.traffic.calibration.lens import lens_of
+from vidtrack.traffic.calibration.lens import Lens
+from vidtrack.traffic.calibration.pairs import Pairs, pairs_of
 from vidtrack.traffic.calibration.straight_road import straight_road
-from vidtrack.traffic.epsg import metric_system
-from vidtrack.traffic.site import Calibration, Site
+from vidtrack.traffic.site import LEAST_FOR_LENS, Site
 
 _log = logging.getLogger(__name__)
 
 _FALSE_ALARM = 0.01
-_OFF_LINE = 1e-3
-"""Probability that errors alone put points on one line as far off it as that."""
 _LEAST_SHARE = 1e-6
 """Smallest singular value over the largest, of the fit: below it the points determine no homography."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pairs:
-    """Points on the road and in the picture, normalised, with their covariances.
-
-    plane, picture           the normalised coordinates
-    X, p                     (N, 2)
-    plane_cov, picture_cov   (N, 2, 2)
-    """
-
-    plane: Normal
-    picture: Normal
-    X: Floats
-    p: Floats
-    plane_cov: Floats
-    picture_cov: Floats
-
-    def fit(self, kept: Floats | slice = slice(None)) -> Fit:
-        """The homography through some of the pairs."""
-        return fitted(self.X[kept], self.p[kept], self.plane_cov[kept], self.picture_cov[kept])
-
-    def residual_cov(self, k: Floats) -> Floats:
-        """(N, 2, 2) of both points, in the normalised picture."""
-        J = by_point(k, self.X)
-        return np.asarray(self.picture_cov + J @ self.plane_cov @ np.swapaxes(J, 1, 2))
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +33,10 @@ class Check:
     residual_px, residual_m   (N,) distance of each point from where the fit puts it
     without_px, without_m     (N,) the same where the fit did not know the point; NaN with four pairs
     d2                        (N,) those errors squared over their covariance, chi-square with 2 degrees; NaN with four
-    chi2, spare               sum of squares of the fit, and its degrees of freedom, 2 N - 8
+    chi2, spare               sum of squares of the fit, and its degrees of freedom, 2 N - 8, or 2 N - 9 with the lens
     wrong                     numbers of the pairs, from 0, that contradict the others
     contradiction             the pairs do not agree within their standard deviations, whether or not one is named
+    lens                      one that explains this better than wrong pairs do; None: there is none
     """
 
     residual_px: Floats
@@ -75,41 +48,7 @@ class Check:
     spare: int
     wrong: tuple[int, ...]
     contradiction: bool
-
-
-def metres_of(calibration: Calibration) -> Floats:
-    """(N, 2) ground points in metres."""
-    ground = np.array(calibration.ground, float)
-    if not calibration.geographic or calibration.epsg is None:
-        return ground
-    import pyproj
-
-    to_metres = pyproj.Transformer.from_crs(4326, metric_system(calibration.epsg), always_xy=True)
-    return np.column_stack(to_metres.transform(ground[:, 0], ground[:, 1]))
-
-
-def pairs_of(site: Site) -> Pairs:
-    """The pairs of a site's calibration. Raises ConfigError where no homography can go through them."""
-    calibration = site.calibration
-    assert calibration is not None
-    lens = lens_of(site)
-    ground, picture = metres_of(calibration), np.array(calibration.picture, float)
-    bend = np.repeat(np.eye(2)[None], len(picture), axis=0)
-    if lens is not None:
-        picture = lens.straight(picture)
-        if not np.isfinite(picture).all():
-            raise ConfigError("calibration.distortion folds the picture back inside its own points; check k1 and k2")
-        bend = np.asarray(np.linalg.inv(lens.jacobian(picture)))
-    _refuse_lines(picture, ground, calibration)
-    plane, view = Normal.of(ground), Normal.of(picture)
-    return Pairs(
-        plane,
-        view,
-        plane.into(ground),
-        view.into(picture),
-        np.repeat(np.eye(2)[None] * (calibration.sigma_ground_m / plane.scale) ** 2, len(ground), axis=0),
-        bend @ np.swapaxes(bend, 1, 2) * (calibration.sigma_picture_px / view.scale) ** 2,
-    )
+    lens: Lens | None
 
 
 def calibrated(site: Site) -> Ground:
@@ -135,8 +74,8 @@ def calibrated(site: Site) -> Ground:
 
 
 def solved(pairs: Pairs) -> Fit:
-    """The homography through all pairs. Raises ConfigError where there is none that a camera above the road sees."""
-    fit = pairs.fit()
+    """The fit through all pairs. Raises ConfigError where there is none that a camera above the road sees."""
+    _, fit = pairs.best()
     variance = np.linalg.eigvalsh(fit.cov)
     if not np.isfinite(fit.k).all() or variance[0] <= _LEAST_SHARE**2 * variance[-1]:
         raise ConfigError(
@@ -164,29 +103,27 @@ def road_plane(site: Site, pairs: Pairs, fit: Fit, check: Check) -> Ground:
     assert calibration is not None
     wider = max(1.0, check.chi2 / check.spare) if check.contradiction else 1.0
     picture = pairs.picture.back(pairs.p)
-    lens = lens_of(site)
-    sigma = calibration.sigma_picture_px
-    center = np.array(site.center)
-    return Ground(
-        pairs.plane, pairs.picture, fit.k, wider * fit.cov, lens, center, calibration.focal_px, hull(picture), sigma
-    )
+    center, focal_px, sigma = np.array(site.center), calibration.focal_px, calibration.sigma_picture_px
+    lens = pairs.lens if pairs.free or pairs.lens.bends else None
+    return Ground(pairs.plane, pairs.picture, fit.k, wider * fit.cov, lens, center, focal_px, hull(picture), sigma)
 
 
 def checked(pairs: Pairs, fit: Fit) -> Check:
     """The fit's residuals, and each pair against the others."""
     count = len(pairs.X)
-    spare = 2 * count - 8
+    spare = 2 * count - pairs.parameters
     residual_px, residual_m = _distances(pairs, fit.k)
     without_px, without_m, d2 = np.full((3, count), np.nan)
-    contradiction = bool(spare and fit.chi2 > chdtri(spare, _FALSE_ALARM))
+    contradiction = bool(spare and _too_large(fit.chi2, spare))
     wrong: list[int] = []
     if count >= 5:
         for i in range(count):
             without_px[i], without_m[i], d2[i] = _left_out(pairs, np.delete(np.arange(count), i), i)
         wrong = _wrong(pairs)
-    return Check(
-        residual_px, residual_m, without_px, without_m, d2, fit.chi2, spare, tuple(wrong), contradiction or bool(wrong)
-    )
+    contradiction = contradiction or bool(wrong)
+    lens = _lens_instead(pairs, wrong) if contradiction else None
+    named = () if lens else tuple(wrong)
+    return Check(residual_px, residual_m, without_px, without_m, d2, fit.chi2, spare, named, contradiction, lens)
 
 
 def doubts(site: Site, check: Check) -> list[str]:
@@ -203,13 +140,26 @@ def doubts(site: Site, check: Check) -> list[str]:
             f"pair {i + 1} of the calibration, picture ({x:g}, {y:g}) and ground ({east:g}, {north:g}), is {off} from "
             "where the other pairs put it; correct it or leave it out"
         )
-    if check.contradiction and not check.wrong:
+    if check.lens is not None:
+        said.append(
+            f"the pairs of the calibration do not agree where straight lines are straight (chi-square {check.chi2:.1f} "
+            f"with {check.spare} degrees of freedom), and do so with a lens that moves the picture's corner by "
+            f'{corner_px(site, check.lens):+.0f} px; write distortion = "fit" into [calibration], or its k1 and k2'
+        )
+    elif check.contradiction and not check.wrong:
         blame = "too few to say which is wrong" if check.spare < 4 else "none stands out"
         said.append(
             f"the pairs of the calibration do not agree within their standard deviations (chi-square {check.chi2:.1f} "
             f"with {check.spare} degrees of freedom); {blame}; errors are given larger by as much"
         )
     return said
+
+
+def corner_px(site: Site, lens: Lens) -> float:
+    """By how much a lens moves the corner of the picture that is farthest from its axis, outwards [px]."""
+    axis, last = np.array(site.center), np.array([site.camera.width, site.camera.height]) - 1
+    arm = float(np.linalg.norm(np.maximum(axis, last - axis))) / lens.focal_px
+    return lens.focal_px * (lens.k1 * arm**3 + lens.k2 * arm**5)
 
 
 def _wrong(pairs: Pairs) -> list[int]:
@@ -222,7 +172,7 @@ def _wrong(pairs: Pairs) -> list[int]:
     limit = chdtri(2, _FALSE_ALARM / count)
     while len(kept) >= 6:
         rests = [kept[kept != i] for i in kept]
-        best = int(np.argmin([pairs.fit(rest).chi2 for rest in rests]))
+        best = int(np.argmin([pairs.best(rest)[1].chi2 for rest in rests]))
         if not _left_out(pairs, rests[best], int(kept[best]))[2] > limit:
             break
         wrong.append(int(kept[best]))
@@ -230,11 +180,32 @@ def _wrong(pairs: Pairs) -> list[int]:
     return sorted(wrong)
 
 
-def _left_out(pairs: Pairs, rest: Floats, i: int) -> tuple[float, float, float]:
+def _lens_instead(pairs: Pairs, wrong: list[int]) -> Lens | None:
+    """The lens with which pairs that no lens was fitted to agree, if it explains them better than wrong ones do.
+
+    By Schwarz's criterion: a lens is one number more, and each pair that is left out two.
+    """
+    count, spare = len(pairs.X), 2 * len(pairs.X) - 9
+    if pairs.free or pairs.lens.bends or count < LEAST_FOR_LENS:
+        return None
+    try:
+        seen, fit = pairs.with_free_lens().best()
+    except ConfigError:  # it would fold the picture back
+        return None
+    _, rest = pairs.best(np.delete(np.arange(count), wrong))
+    better = fit.chi2 < rest.chi2 + (2 * len(wrong) - 1) * math.log(2 * count)
+    return seen.lens if better and not _too_large(fit.chi2, spare) else None
+
+
+def _too_large(chi2: float, spare: int) -> bool:
+    return chi2 > chdtri(spare, _FALSE_ALARM)
+
+
+def _left_out(pairs: Pairs, rest: Ints, i: int) -> tuple[float, float, float]:
     """Distance of a pair from where the rest puts it [px, m], and its square over its covariance."""
-    fit = pairs.fit(rest)
+    pairs, fit = pairs.best(rest)
     off = (picture_of(fit.k, pairs.X[[i]]) - pairs.p[[i]])[0]
-    J = by_k(fit.k, pairs.X[[i]])[0]
+    J = pairs.by_fit(fit.k)[i]
     cov = pairs.residual_cov(fit.k)[i] + J @ fit.cov @ J.T
     px, m = _distances(pairs, fit.k)
     return px[i], m[i], float(off @ np.linalg.solve(cov, off))
@@ -245,26 +216,3 @@ def _distances(pairs: Pairs, k: Floats) -> tuple[Floats, Floats]:
     in_picture = np.linalg.norm(picture_of(k, pairs.X) - pairs.p, axis=1) * pairs.picture.scale
     on_road = np.linalg.norm(plane_of(k, pairs.p) - pairs.X, axis=1) * pairs.plane.scale
     return in_picture, on_road
-
-
-def _refuse_lines(picture: Floats, ground: Floats, calibration: Calibration) -> None:
-    """Raise ConfigError for pairs of which all but one are on a line."""
-    count = len(picture)
-    for name, points, sigma in (
-        ("picture", picture, calibration.sigma_picture_px),
-        ("ground", ground, calibration.sigma_ground_m),
-    ):
-        for i in range(count):
-            off, errors = _off_line(np.delete(points, i, axis=0)), sigma * math.sqrt(chdtri(count - 3, _OFF_LINE))
-            if off <= max(errors, 1e-9 * np.ptp(points)):
-                numbers = ", ".join(str(k + 1) for k in range(count) if k != i)
-                raise ConfigError(
-                    f"calibration: points {numbers} of the {count} in {name} lie on one line, within their errors; no "
-                    "plane is determined; give 4 of which no 3 are in line, or more"
-                )
-
-
-def _off_line(points: Floats) -> float:
-    """Root of the sum of squared distances of points (N, 2) from the line that fits them best."""
-    off = points - points.mean(axis=0)
-    return float(np.linalg.svd(off, compute_uv=False)[1])

@@ -22,7 +22,8 @@ class Ground:
     """A calibrated picture. Positions are in metres, x east, y north.
 
     plane, picture   normalised coordinates of the homography, metres and undistorted pixels
-    k, cov           (8,), (8, 8) the homography and its covariance, which all positions share
+    k, cov           (8,), (8, 8) the homography and its covariance, which all positions share; (9, 9) with k1 of a
+                     lens that was fitted with it
     lens             None: straight lines are straight
     center           (2,) where the optical axis meets the picture [px]
     focal_px         None: from the homography
@@ -81,9 +82,9 @@ class Ground:
     @property
     def homography(self) -> Floats:
         """(3, 3) from metres to homogeneous undistorted picture points [px]."""
-        plane = np.diag([1 / self.plane.scale, 1 / self.plane.scale, 1.0])
-        plane[:2, 2] = -self.plane.origin / self.plane.scale
-        return np.asarray(self._from_plane() @ plane)
+        moved = np.eye(3)
+        moved[:2, 2] = -self.plane.origin
+        return np.asarray(self.about_origin @ moved)
 
     def pose(self) -> Pose | None:
         """The camera; None where its focal length cannot be told from the homography."""
@@ -101,22 +102,60 @@ class Ground:
         return np.stack([d, -b, -c, a], axis=1).reshape(-1, 2, 2) / (a * d - b * c)[:, None, None]
 
     def by_shared_error(self, xy_m: Floats) -> Floats:
-        """(N, 2, 8) derivative of positions, at fixed picture points, with respect to eight independent errors of
-        unit variance that the calibration makes: with D of two positions, their covariance is D1 D2'.
+        """(N, 2, E) derivative of positions, at fixed picture points, with respect to E independent errors of unit
+        variance that the calibration makes: with D of two positions, their covariance is D1 D2'.
         """
-        X = self.plane.into(xy_m)
+        X, errors = self.plane.into(xy_m), self._errors()
         (a, b), (c, d) = by_point(self.k, X).transpose(1, 2, 0)[..., None]
-        across, down = by_k(self.k, X).transpose(1, 0, 2)
-        # picture_of(k, X) stays where it is
+        across, down = self._by_parameters(X).transpose(1, 0, 2)
+        # picture_of(k, X) less the straightened point stays 0
         moved = np.stack([d * across - b * down, a * down - c * across], axis=1) / (a * d - b * c)[:, None]
-        return np.asarray(-self.plane.scale * (moved.reshape(-1, 8) @ self._errors()).reshape(-1, 2, 8))
+        count = len(errors)
+        return np.asarray(-self.plane.scale * (moved.reshape(-1, count) @ errors).reshape(-1, 2, count))
 
     def varied(self) -> Iterator[tuple[Ground, Ground]]:
-        """Pairs of calibrations, each pair one of those eight errors above and below this one."""
+        """Pairs of calibrations, each pair one of those errors above and below this one."""
         for error in self._errors().T:
-            yield replace(self, k=self.k + error), replace(self, k=self.k - error)
+            yield self._off_by(error), self._off_by(-error)
+
+    @property
+    def homography_cov(self) -> Floats:
+        """(8, 8), or (9, 9) with k1, covariance of the first eight elements of `about_origin`, row by row."""
+        J = np.eye(len(self.cov))
+        J[:8, :8] = np.column_stack(
+            [self._about_origin(matrix(e) - matrix(np.zeros(8))).ravel()[:8] for e in np.eye(8)]
+        )
+        return J @ self.cov @ J.T
+
+    @property
+    def about_origin(self) -> Floats:
+        """(3, 3) from metres, less the origin of `plane`, to homogeneous undistorted picture points [px]; the last
+        element is 1."""
+        return self._about_origin(matrix(self.k))
+
+    def _about_origin(self, normalised: Floats) -> Floats:
+        view = np.diag([self.picture.scale, self.picture.scale, 1.0])
+        view[:2, 2] = self.picture.origin
+        return np.asarray(view @ normalised @ np.diag([1 / self.plane.scale, 1 / self.plane.scale, 1.0]))
+
+    def _by_parameters(self, X: Floats) -> Floats:
+        """(N, 2, E) derivative of the picture of X less the straightened point, in normalised coordinates."""
+        by_homography = by_k(self.k, X)
+        if self.lens is None or len(self.cov) == len(self.k):
+            return by_homography
+        straight = self.picture.back(picture_of(self.k, X))
+        return np.concatenate(
+            [by_homography, -self.lens.straightening(straight)[:, :, None] / self.picture.scale], axis=2
+        )
+
+    def _off_by(self, error: Floats) -> Ground:
+        """The calibration with an error (E,) of its numbers."""
+        lens = self.lens
+        if lens is not None and len(error) > len(self.k):
+            lens = replace(lens, k1=lens.k1 + float(error[-1]))
+        return replace(self, k=self.k + error[: len(self.k)], lens=lens)
 
     def _errors(self) -> Floats:
-        """(8, 8) a square root of the covariance."""
+        """(E, E) a square root of the covariance."""
         variance, direction = np.linalg.eigh(self.cov)
         return np.asarray(direction * np.sqrt(np.maximum(variance, 0)))

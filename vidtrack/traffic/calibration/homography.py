@@ -42,7 +42,10 @@ class Normal:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """k (8,), its covariance (8, 8), and the sum of squares of the weighted residuals (chi-square, 2 N - 8)."""
+    """k (8,), its covariance (8, 8), and the sum of squares of the weighted residuals (chi-square, 2 N - 8).
+
+    With k1 of the lens the covariance is (9, 9), and chi-square has 2 N - 9 degrees of freedom.
+    """
 
     k: Floats
     cov: Floats
@@ -121,20 +124,19 @@ def fitted(X: Floats, p: Floats, plane_cov: Floats, picture_cov: Floats) -> Fit:
 
     k = start(X, p)
     for _ in range(_REWEIGHTINGS):
-        root = _whitening(k, X, plane_cov, picture_cov)
+        root = whitening(by_point(k, X), plane_cov, picture_cov)
         k = least_squares(
             lambda k, root=root: np.einsum("nij,nj->ni", root, picture_of(k, X) - p).ravel(),
             k,
             jac=lambda k, root=root: (root @ by_k(k, X)).reshape(-1, 8),
             method="lm",
         ).x
-    root = _whitening(k, X, plane_cov, picture_cov)
+    root = whitening(by_point(k, X), plane_cov, picture_cov)
     J = (root @ by_k(k, X)).reshape(-1, 8)
     residual = np.einsum("nij,nj->ni", root, picture_of(k, X) - p)
     return Fit(k, np.asarray(np.linalg.pinv(J.T @ J, hermitian=True)), float(np.sum(residual**2)))
 
 
-def _whitening(k: Floats, X: Floats, plane_cov: Floats, picture_cov: Floats) -> Floats:
-    """(N, 2, 2) inverse square roots of the residuals' covariances."""
-    J = by_point(k, X)
+def whitening(J: Floats, plane_cov: Floats, picture_cov: Floats) -> Floats:
+    """(N, 2, 2) inverse square roots of the residuals' covariances; J (N, 2, 2) from the plane to the picture."""
     return np.asarray(np.linalg.inv(np.linalg.cholesky(picture_cov + J @ plane_cov @ np.swapaxes(J, 1, 2))))

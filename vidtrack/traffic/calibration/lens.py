@@ -21,6 +21,11 @@ class Lens:
     focal_px: float
     center: tuple[float, float]
 
+    @property
+    def bends(self) -> bool:
+        """Whether there is any distortion."""
+        return (self.k1, self.k2) != (0, 0)
+
     def straight(self, xy: Floats) -> Floats:
         """(N, 2) picture points [px] without the distortion; NaN beyond the radius at which the picture folds back."""
         bent = (xy - self.center) / self.focal_px
@@ -46,6 +51,15 @@ class Lens:
         turning = (2 * self.k1 + 4 * self.k2 * r2)[:, None, None] * outer
         return self._gain(np.sqrt(r2))[:, None, None] * np.eye(2) + turning
 
+    def by_k1(self, xy: Floats) -> Floats:
+        """(N, 2) derivative of `bent` with respect to k1 at points of an undistorted picture [px]."""
+        straight = (xy - self.center) / self.focal_px
+        return np.asarray(self.focal_px * straight * np.sum(straight**2, axis=1)[:, None])
+
+    def straightening(self, xy: Floats) -> Floats:
+        """(N, 2) derivative of `straight` with respect to k1, where it gives these points of an undistorted picture."""
+        return np.asarray(-np.linalg.solve(self.jacobian(xy), self.by_k1(xy)[:, :, None])[:, :, 0])
+
     def _gain(self, r: Floats) -> Floats:
         return 1 + self.k1 * r**2 + self.k2 * r**4
 
@@ -53,9 +67,9 @@ class Lens:
         return 1 + 3 * self.k1 * r**2 + 5 * self.k2 * r**4
 
 
-def lens_of(site: Site) -> Lens | None:
-    """The lens of a site's camera; None without a calibration or without distortion."""
+def lens_of(site: Site) -> Lens:
+    """The lens that a site states; without distortion where it states none, or leaves it to the points."""
     calibration = site.calibration
-    if calibration is None or calibration.distortion is None or calibration.focal_px is None:
-        return None
-    return Lens(*calibration.distortion, calibration.focal_px, site.center)
+    assert calibration is not None
+    k1, k2 = calibration.distortion if isinstance(calibration.distortion, tuple) else (0.0, 0.0)
+    return Lens(k1, k2, calibration.focal_px or site.camera.width, site.center)

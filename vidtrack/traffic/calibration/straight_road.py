@@ -20,7 +20,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.calibration.homography import Normal
 from vidtrack.traffic.calibration.hull import hull
-from vidtrack.traffic.calibration.lens import lens_of
+from vidtrack.traffic.calibration.lens import Lens, lens_of
 from vidtrack.traffic.site import Site
 
 _FALSE_ALARM = 0.01
@@ -75,14 +75,22 @@ class RoadFit:
 
 def straight_road(site: Site) -> RoadFit:
     """The road plane from segments. Raises ConfigError where they do not determine it."""
-    calibration, lens, center = site.calibration, lens_of(site), np.array(site.center)
+    calibration, center = site.calibration, np.array(site.center)
     assert calibration is not None
-    segments = _segments(site)
+    stated = lens_of(site)
+    lens = stated if stated.bends else None
+    segments = _segments(site, lens)
     free = np.array([True, True, bool(calibration.across), calibration.focal_px is None, True])
     focals = [calibration.focal_px or site.camera.width * share for share in _STARTS[: None if free[3] else 1]]
     starts = [_start(segments, focal) for focal in focals]
     sigmas = calibration.sigma_picture_px, calibration.sigma_ground_m
-    fits = [_fitted(start, free, segments, *sigmas) for start in starts]
+    try:
+        fits = [_fitted(start, free, segments, *sigmas) for start in starts]
+    except np.linalg.LinAlgError:  # the camera went down to the road
+        raise ConfigError(
+            "calibration: no camera above the road sees these segments: parallel ones meet in the distance, at the "
+            "horizon above them; check directions, across and lengths"
+        ) from None
     theta, cov, chi2, spare = min(fits, key=lambda fit: fit[2])
     if not (np.isfinite(cov).all() and np.sqrt(cov[3, 3]) < _MOST_SIGMA and np.sqrt(cov[4, 4]) < _MOST_SIGMA):
         raise ConfigError(
@@ -115,8 +123,8 @@ def homography(theta: Floats) -> Floats:
     return np.asarray(np.diag([focal, focal, 1.0]) @ np.column_stack([R[:, 0], R[:, 1], -height * R[:, 2]]))
 
 
-def _segments(site: Site) -> Segments:
-    calibration, lens, center = site.calibration, lens_of(site), np.array(site.center)
+def _segments(site: Site, lens: Lens | None) -> Segments:
+    calibration, center = site.calibration, np.array(site.center)
     assert calibration is not None
     metres = np.array([metres for _, _, metres in calibration.lengths])
 

@@ -130,7 +130,9 @@ def paths_of(ground: Ground, xy: Floats, first: Ints, sound: Mask) -> Paths:
 
     known = length > _LEAST_M
     if not known.any():
-        return Paths(middle[known], angle[known], length[known], angle[known], angle[known], np.empty((0, 8)))
+        return Paths(
+            middle[known], angle[known], length[known], angle[known], angle[known], np.empty((0, len(ground.cov)))
+        )
     normal[~known] = np.eye(3)  # a short piece may be a single place
     arm = (ground.pixels(xy) - ground.center) / np.linalg.norm(ground.center)
     moved = np.einsum("kij,kj->ki", ground.by_own_error(xy), arm * np.sum(arm**2, axis=1)[:, None])

@@ -1,0 +1,56 @@
+"""A homography and k1 of the lens through the same points.
+
+Residuals are taken in the picture as the lens shows it, where the errors of the points are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats
+from vidtrack.traffic.calibration.homography import Fit, Normal, by_k, by_point, picture_of, start, whitening
+from vidtrack.traffic.calibration.lens import Lens
+
+_REWEIGHTINGS = 4
+
+
+def fitted_with_lens(
+    X: Floats, shown: Floats, plane_cov: Floats, sigma_px: float, view: Normal, lens: Lens
+) -> tuple[Lens, Fit]:
+    """Least squares over points on the plane X (N, 2) and in the picture as the lens shows them (N, 2) [px].
+
+    plane_cov  (N, 2, 2) of the points on the plane
+    view       normalised coordinates of the picture without distortion, those of k
+    lens       whose k1 is looked for; the fit's covariance is (9, 9), of k and k1
+    """
+    from scipy.optimize import least_squares  # slow to import, and few runs need it
+
+    def off(theta: Floats) -> Floats:
+        straight = view.back(picture_of(theta[:8], X))
+        return np.asarray(replace(lens, k1=theta[8]).bent(straight) - shown)
+
+    def derivative(theta: Floats) -> Floats:
+        straight, one = view.back(picture_of(theta[:8], X)), replace(lens, k1=theta[8])
+        by_homography = one.jacobian(straight) @ by_k(theta[:8], X) * view.scale
+        return np.concatenate([by_homography, one.by_k1(straight)[:, :, None]], axis=2)
+
+    def weights(theta: Floats) -> Floats:
+        straight = view.back(picture_of(theta[:8], X))
+        J = replace(lens, k1=theta[8]).jacobian(straight) @ by_point(theta[:8], X) * view.scale
+        return whitening(J, plane_cov, sigma_px**2 * np.eye(2))
+
+    theta = np.append(start(X, view.into(shown)), 0.0)
+    for _ in range(_REWEIGHTINGS):
+        root = weights(theta)
+        theta = least_squares(
+            lambda theta, root=root: np.einsum("nij,nj->ni", root, off(theta)).ravel(),
+            theta,
+            jac=lambda theta, root=root: (root @ derivative(theta)).reshape(-1, 9),
+            method="lm",
+        ).x
+    root = weights(theta)
+    J, residual = (root @ derivative(theta)).reshape(-1, 9), np.einsum("nij,nj->ni", root, off(theta))
+    cov = np.asarray(np.linalg.pinv(J.T @ J, hermitian=True))
+    return replace(lens, k1=float(theta[8])), Fit(theta[:8], cov, float(np.sum(residual**2)))
