@@ -80,10 +80,14 @@ def paired(truth: list[tuple], found: list[tuple]) -> list[tuple[int, int]]:
     return [(i, j) for i, j in zip(rows, columns, strict=True) if cost[i, j] < 1e3]
 
 
-def conflicts(clip: Path, events: list[dict[str, str]], rows: list[dict]) -> dict[str, Any]:
-    """Conflicts: how many there were, were found, and were right; errors of the post-encroachment times [s]."""
+def conflicts(clip: Path, events: list[dict[str, str]], rows: list[dict], site: Site) -> dict[str, Any]:
+    """Conflicts: how many there were, were found, and were right; errors of the post-encroachment times [s].
+
+    `near` and `near_met` are of vehicles that were both within the calibration's points.
+    """
     true = [event for event in events if event["event"] == "conflict"]
     states = {(int(row["target_id"]), int(row["frame"])): row for row in rows_of(clip / "road_truth.csv")}
+    near = np.array([within_points(site, states, event) for event in true], bool)
     cost = np.full((len(true), len(rows)), 1e3)
     for i, event in enumerate(true):
         at = states.get((int(event["target_id"]), round(float(event["time_s"]) * FPS) + 1))
@@ -100,7 +104,29 @@ def conflicts(clip: Path, events: list[dict[str, str]], rows: list[dict]) -> dic
     both = [(i, j) for i, j in pairs if true[i]["pet_s"] and rows[j]["pet_s"] is not None]
     pet = np.array([rows[j]["pet_s"] - float(true[i]["pet_s"]) for i, j in both])
     sigma = np.array([rows[j]["pet_sigma_s"] for _, j in both])
-    return {"close": len(true), "said": len(rows), "met": len(pairs), "pet": pet, "pet_sigma": sigma}
+    met = [i for i, _ in pairs]
+    return {
+        "close": len(true),
+        "said": len(rows),
+        "met": len(pairs),
+        "near": int(near.sum()),
+        "near_met": int(near[met].sum()),
+        "pet": pet,
+        "pet_sigma": sigma,
+    }
+
+
+def within_points(site: Site, states: dict[tuple[int, int], dict[str, str]], event: dict[str, str]) -> bool:
+    """Whether both vehicles of a conflict are within the hull of the calibration's points when they count."""
+    second_s = float(event["time_s"])
+    first_s = second_s - float(event["pet_s"] or 0)
+    moments = [(int(event["target_id"]), second_s), (int(event["other_id"]), first_s)]
+    rows = [states.get((vehicle, round(time_s * FPS) + 1)) for vehicle, time_s in moments]
+    if site.calibration is None or None in rows:
+        return False
+    ground = calibrated(site)
+    places = np.array([[float(row["x_m"]), float(row["y_m"])] for row in rows if row])
+    return bool(np.isfinite(ground.inside(ground.pixels(places))).all())
 
 
 def queues(events: list[dict[str, str]], rows: list[dict]) -> dict[str, Any]:
@@ -214,14 +240,14 @@ def score(clip: Path, run: Path, site: Site) -> dict[str, Any]:
         "untracked": sum(not tracked(clip, run, true[i]) for i in set(range(len(true))) - {i for i, _ in pairs}),
         "off": np.array(off),
         "sigma": np.array(sigma),
-        **conflicts(clip, events, found["conflicts"].to_pylist() if "conflicts" in found else []),
+        **conflicts(clip, events, found["conflicts"].to_pylist() if "conflicts" in found else [], site),
         **queues(events, found["queues"].to_pylist()),
     }
 
 
 def told(name: str, results: list[dict[str, Any]]) -> str:
     counts = ("true", "found", "hit", "ways", "held", "movements", "trips", "right")
-    counts += ("untracked", "close", "said", "met")
+    counts += ("untracked", "close", "said", "met", "near", "near_met")
     total = {key: max(sum(result[key] for result in results), 1e-9) for key in counts}
     off, sigma, pet, pet_sigma = (
         np.concatenate([result[key] for result in results]) for key in ("off", "sigma", "pet", "pet_sigma")
@@ -240,7 +266,7 @@ def told(name: str, results: list[dict[str, Any]]) -> str:
         f"| {total['movements']:.0f} | {total['right'] / total['movements']:.3f} "
         f"| {total['right'] / total['trips']:.3f} {speeds} {len(off) / total['hit']:.2f} | {total['untracked']:.0f} "
         f"| {total['close']:.0f} | {total['met'] / total['close']:.3f} | {total['met'] / total['said']:.3f} "
-        f"| {late} |"
+        f"| {total['near_met']:.0f} of {total['near']:.0f} | {late} |"
     )
 
 
@@ -273,7 +299,7 @@ def main() -> None:
     pet = "PET error: median, median absolute | in 95 %"
     print(
         f"| clip | crossings | {of} | bounds of counts hold | movements | {of} | {speed} | missed without a track "
-        f"| conflicts | {of} | {pet} |"
+        f"| conflicts | {of} | found within the calibration's points | {pet} |"
     )
     exact, real = [], []
     lines = []

@@ -1,12 +1,11 @@
 """Conflicts: known times, brute force over exact rectangles, simulated roads, and errors by repetition."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from drawn_runs import CALIBRATED, SITE, along, site, write_run
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from meeting_rows import driven, found_in, rows_of
 
 from vidtrack.simulate import simulate_road
 from vidtrack.simulate.roads.conflicts import conflicts as exact_conflicts
@@ -17,43 +16,6 @@ from vidtrack.simulate.scene import touching
 from vidtrack.traffic.measures.bodies import least_of
 from vidtrack.traffic.measures.conflicts import PET, TTC, Meeting
 from vidtrack.traffic.measures.measure import measured
-from vidtrack.traffic.measures.rows import Rows
-
-ALWAYS = np.array([[0.0, 1e6]])
-
-
-def rows_of(track, t, xy, v, length=4.0, width=2.0, heading=None, sigma=0.0, speed_sigma=0.0, length_sigma=0.0):
-    """Rows (N,) in order of time; `heading` (N,) rad from east, None: the way of v (N, 2)."""
-    track, t, xy, v = (np.asarray(one) for one in (track, t, xy, v))
-    count = len(t)
-    angle = np.arctan2(v[:, 1], v[:, 0]) if heading is None else np.asarray(heading)
-    yes, full = np.ones(count, bool), lambda value: np.broadcast_to(np.asarray(value, float), count)
-    sides = full(length), full(length_sigma), full(width)
-    spread = np.column_stack([full(sigma**2), full(sigma**2), full(0)])
-    ahead = np.column_stack([np.cos(angle), np.sin(angle)])
-    rows = Rows(
-        *(track, t, yes, ~yes, ~yes, xy.astype(float), full(sigma), full(1.0), v.astype(float)),
-        *(np.hypot(*v.T), full(speed_sigma), full(0), *sides, ahead, spread, *2 * [np.full((count, 4), np.nan)]),
-    )
-    return rows.only(np.argsort(t, kind="stable"))
-
-
-def driven(*ways, fps=25.0, seconds=8.0):
-    """Tracks, times, places and velocities of vehicles that start at x, y with vx, vy."""
-    t = np.arange(round(seconds * fps) + 1) / fps
-    start = np.array(ways, float)
-    xy = start[:, None, :2] + t[None, :, None] * start[:, None, 2:]
-    v = np.broadcast_to(start[:, None, 2:], xy.shape)
-    return np.repeat(np.arange(len(ways)), len(t)), np.tile(t, len(ways)), xy.reshape(-1, 2), v.reshape(-1, 2)
-
-
-def found_in(rows, block=None, vehicle=None):
-    meeting, block = Meeting(), block or max(1, len(rows))
-    for first in range(0, len(rows), block):
-        meeting.add(rows.only(np.arange(first, min(first + block, len(rows)))))
-    tracks = int(rows.track.max(initial=0)) + 1
-    return meeting.conflicts(np.arange(tracks) if vehicle is None else vehicle, ALWAYS)
-
 
 RANK = st.sampled_from([0.0, 1.0, 2.0, np.nan])
 
@@ -227,36 +189,6 @@ def test_post_encroachment_times_are_those_of_brute_force(seed, block):
                 assert np.isnan(pet)
 
 
-def bend(track, start_s, turn_rad, speed=6.0, radius=7.0):
-    """A vehicle that drives 30 m to the east, turns left by an angle, and goes straight on for 30 m."""
-    s = np.arange(0, 60 + radius * turn_rad, speed / 25)
-    angle = np.clip((s - 30) / radius, 0, turn_rad)
-    heading = np.column_stack([np.cos(angle), np.sin(angle)])
-    xy = np.cumsum(heading, axis=0) * speed / 25
-    return np.full(len(s), track), start_s + s / speed, xy, speed * heading
-
-
-def both(*ways):
-    return rows_of(*(np.concatenate(column) for column in zip(*ways, strict=True)), width=1.8)
-
-
-@pytest.mark.parametrize(("first", "second"), [(np.pi / 2, np.pi / 2), (0.0, np.pi / 2), (np.pi / 2, 0.0)])
-def test_vehicles_behind_each_other_have_no_encroachment_on_a_bend_and_where_one_turns_off(first, second):
-    rows = both(bend(0, 0.0, first), bend(1, 2.0, second))
-    assert len(found_in(rows)) == 0
-    assert len(found_in(rows, block=20)) == 0
-
-
-def test_one_that_turns_into_the_way_of_another_encroaches():
-    track, t, xy, v = bend(1, 2.0, np.pi / 2)
-    turned = np.array([30.0, 37.0]) + np.column_stack([xy[:, 1], -xy[:, 0]])  # from the north to the east
-    south = np.column_stack([v[:, 1], -v[:, 0]])
-    found = found_in(both(bend(0, 0.0, 0.0), (track, t, turned, south)))
-    assert (found.first.tolist(), found.second.tolist()) == ([0], [1])
-    assert 0 < found.value[PET, 0] < 5
-    assert found.kinds[0] in ("merging", "crossing")
-
-
 def test_the_finer_the_rows_the_same_the_post_encroachment_time():
     """Between rows vehicles go straight on: 5 frames/s give what 100 do."""
     ways = (0, 0, 9.3, 0), (21, -57, 2.1, 11.7)
@@ -353,42 +285,6 @@ def test_nobody_and_one_alone_are_in_no_conflict(tmp_path, seconds):
     tracks = [along(1, np.arange(25) / 25, 100 + 2 * np.arange(25))] if seconds else []
     found = measured([write_run(tmp_path / "run", tracks, metres=True)], site(CALIBRATED))
     assert len(found.tables["conflicts"]) == found.report["conflicts"] == 0
-
-
-def test_errors_of_headings_are_those_of_the_time_where_one_turns_into_the_way_of_another():
-    """Where the headings cross clearly nothing depends on them."""
-    track, t, xy, v = bend(1, 2.0, np.pi / 2)
-    turned = np.array([30.0, 37.0]) + np.column_stack([xy[:, 1], -xy[:, 0]])  # from the north to the east
-    south = np.column_stack([v[:, 1], -v[:, 0]])
-    merging = both(bend(0, 0.0, 0.0), (track, t, turned, south))
-    crossing = rows_of(*driven((0, 0, 10, 0), (20, -65, 0, 12)))
-    for rows, depends in ((merging, True), (crossing, False)):
-        values, sigmas = [], []
-        for sigma in (0.0, 0.7):
-            found = found_in(replace(rows, speed_sigma=np.full(len(rows), sigma)))
-            values.append(found.value[PET, 0])
-            sigmas.append(found.sigma[PET, 0])
-        assert values[0] == values[1]
-        assert (sigmas[1] > sigmas[0] + 0.01) == depends
-
-
-@pytest.mark.parametrize("turn_rad", [np.pi / 2, np.pi / 4])
-def test_the_error_by_headings_is_half_of_what_the_wait_gains_if_they_must_differ_by_two_sigmas_more(turn_rad):
-    """By the waits of all pairs of rows; on the lesser turn headings nowhere differ by so much, and it is 5 s."""
-    track, t, xy, v = bend(1, 2.0, turn_rad)
-    cos, sin = np.cos(turn_rad), np.sin(turn_rad)
-    away = np.array([[cos, -sin], [sin, cos]])  # by which it ends on the way to the east
-    turned = np.array([60.0, 0.0]) + (xy - xy[-1]) @ away
-    rows = both(bend(0, 0.0, 0.0), (track, t, turned, v @ away))
-    base = footprints(rows.xy, np.arctan2(*rows.v.T[::-1]), np.full(len(rows), 4.0), np.full(len(rows), 1.8))
-    i, j = (k.ravel() for k in np.meshgrid(*(np.flatnonzero(rows.track == one) for one in (0, 1))))
-    apart = np.arccos(np.clip(np.sum(rows.ahead[i] * rows.ahead[j], axis=1), -1, 1))
-    hit = touching(base[i], base[j])
-    wait = [np.abs(rows.t[i] - rows.t[j])[hit & (apart >= np.radians(30) + more)].min(initial=5.0)
-            for more in (0.0, 2 * np.hypot(0.7, 0.7) / 6)]  # fmt: skip
-    sigma = [found_in(replace(rows, speed_sigma=np.full(len(rows), one))).sigma[PET, 0] for one in (0.0, 0.7)]
-    assert wait[1] > wait[0] + 0.05
-    assert np.sqrt(sigma[1] ** 2 - sigma[0] ** 2) == pytest.approx((wait[1] - wait[0]) / 2, abs=1e-6)
 
 
 def test_who_slides_along_another_is_closed_up_to_from_behind_if_at_all():

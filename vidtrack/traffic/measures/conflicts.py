@@ -9,16 +9,17 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.traffic.measures.bodies import Bodies, Encounters
 from vidtrack.traffic.measures.closing import closing
-from vidtrack.traffic.measures.encroachment import CROSSING_RAD, PET_S, encroachments
+from vidtrack.traffic.measures.encroachment import CHORD_S, CROSSING_RAD, PET_S, encroachments
 from vidtrack.traffic.measures.rows import Rows
 
 _ACROSS_RAD, _AGAINST_RAD = np.radians(85), np.radians(150)
 """Angles from which on vehicles cross (SSAM), and meet head-on"""
 KINDS = "rear-end", "merging", "crossing", "head-on"
 TTC, PET = range(2)
-_MEMORY_S = 3 * PET_S
-"""s; who encroaches is judged PET_S late, by where the second vehicle was up to PET_S before, and the first one up to
-PET_S before that"""
+_LATE_S = PET_S + CHORD_S
+"""s; who encroaches is judged so late: when all of the first vehicle's rows that count have their headings"""
+_MEMORY_S = 2 * PET_S + CHORD_S + _LATE_S
+"""s; that is judged by where the second vehicle was up to PET_S before, and the first one up to PET_S before that"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,14 +75,14 @@ class Meeting:
             self._look(until=self._recent.t[-1])
 
     def _look(self, until: float) -> None:
-        """Take the moments before `until` that are new; for encroachments those PET_S earlier."""
+        """Take the moments before `until` that are new; for encroachments those _LATE_S earlier."""
         bodies = self._recent
         if until <= self._done:
             return
         first, last = np.searchsorted(bodies.t, [self._done, until])
         if first < last:
             self._closed.append(closing(bodies.only(slice(first, last))))
-        self._encroached.append(encroachments(bodies, self._done - PET_S, until - PET_S))
+        self._encroached.append(encroachments(bodies, self._done - _LATE_S, until - _LATE_S))
         self._done = until
         self._recent = bodies.only(slice(np.searchsorted(bodies.t, until - _MEMORY_S, side="right"), None))
 

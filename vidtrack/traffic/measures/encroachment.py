@@ -17,6 +17,7 @@ arriving less leaving over its corners.
 
 Where one vehicle turns into the way of another, the time depends on where their headings begin or cease to differ by
 CROSSING_RAD, and so on the errors of the headings: sigma has by how much longer it would be if they had to differ more.
+Where they would nowhere differ by one standard deviation more, nobody knows whether their ways cross.
 """
 
 from __future__ import annotations
@@ -41,6 +42,11 @@ _ROUNDING_S = 1e-6
 _SURE = 2.0
 """Standard deviations of a time by which it must be more than 0, and in all less than PET_S: where ways are almost
 parallel nobody knows where they cross; and of headings, by which more they may have to differ"""
+CHORD_S, _CHORD_M = 0.6, 3.0
+"""s, m; the heading is that of the way from so long before to so long after, where that is so long: the velocity of a
+filter follows a turn late"""
+_CHORD_SIGMA = 0.6
+"""Error of such a heading over that of a filter's, root mean squares in turns (roundabouts and junctions 600 to 605)"""
 _SLOWEST = 0.5
 """m/s; for when a vehicle that is about to stand leaves or comes, since it does not go on with that speed"""
 
@@ -59,17 +65,23 @@ def encroachments(bodies: Bodies, since: float, until: float) -> Encounters:
     """
     order = by_number(bodies.track)
     track, rectangle = _sorted(bodies.track, bodies.table, order)
+    _head_along(track, rectangle)
     i, j = _met(track, rectangle, since, until)
     late = rectangle[i, T] > rectangle[j, T]
     i, j = np.where(late, j, i), np.where(late, i, j)
     steps = _step(track, rectangle, i, 1) + _step(track, rectangle, j, -1)
     first, second = bodies.only(order[i]), bodies.only(order[j])
+    for one, row in ((first, i), (second, j)):
+        one.ahead[:] = rectangle[row, EX : EY + 1]
     found = _details(first, second, steps)
     counts = (found.rank > 0) & (found.value > _SURE * found.sigma) & (_SURE * found.sigma < PET_S)
     counts[counts] = ~_follows(i[counts], j[counts], track, rectangle)
-    turned = _SURE * np.hypot(first.heading_sigma, second.heading_sigma)[counts]
+    turned = _CHORD_SIGMA * np.hypot(first.heading_sigma, second.heading_sigma)
+    counts[counts] = _wait(i[counts], j[counts], turned[counts], track, rectangle) < PET_S
+    i, j = i[counts], j[counts]
+    longer = _wait(i, j, _SURE * turned[counts], track, rectangle) - (rectangle[j, T] - rectangle[i, T])
     by_heading = np.zeros(len(found))
-    by_heading[counts] = _longer(i[counts], j[counts], turned, track, rectangle) / _SURE
+    by_heading[counts] = np.maximum(longer, 0.0) / _SURE
     return replace(found, value=np.where(counts, found.value, np.nan), sigma=np.hypot(found.sigma, by_heading))
 
 
@@ -140,6 +152,34 @@ def _sorted(track: Ints, table: Floats, order: Ints) -> tuple[Ints, Floats]:
         for column in range(WIDTH + 1):
             rectangle[k, column] = table[order[k], column]
     return tracks, rectangle
+
+
+@kernel
+def _head_along(track: Ints, rectangle: Floats) -> None:
+    """Give each rectangle (N, 7) the heading of the chord of its way, where that is at least _CHORD_M long.
+
+    The chord reaches as far back as ahead, up to CHORD_S and to the ends of the track.
+    """
+    low = high = begin = end = 0
+    for i in range(len(track)):
+        if i == end:
+            begin = low = high = i
+            while end < len(track) and track[end] == track[begin]:
+                end += 1
+        t = rectangle[i, T]
+        reach = min(CHORD_S, t - rectangle[begin, T], rectangle[end - 1, T] - t) + _ROUNDING_S
+        while rectangle[low, T] < t - reach:
+            low += 1
+        while low > begin and rectangle[low - 1, T] >= t - reach:
+            low -= 1
+        while high + 1 < end and rectangle[high + 1, T] <= t + reach:
+            high += 1
+        while rectangle[high, T] > t + reach:
+            high -= 1
+        dx, dy = rectangle[high, X] - rectangle[low, X], rectangle[high, Y] - rectangle[low, Y]
+        far = np.sqrt(dx * dx + dy * dy)
+        if far >= _CHORD_M:
+            rectangle[i, EX], rectangle[i, EY] = dx / far, dy / far
 
 
 @kernel
@@ -234,25 +274,25 @@ def _nearest(
 
 
 @kernel
-def _longer(first: Ints, second: Ints, turned: Floats, track: Ints, rectangle: Floats) -> Floats:
-    """(E,) s; by how much longer the wait between rows `first` and `second` is, over all places, if headings must
-    differ by `turned` (E,) rad more; up to PET_S where they nowhere do."""
-    longer = np.zeros(len(first))
+def _wait(first: Ints, second: Ints, turned: Floats, track: Ints, rectangle: Floats) -> Floats:
+    """(E,) s; the wait between rows `first` and `second`, over all places, if headings must differ by `turned` (E,) rad
+    more; PET_S where they nowhere do."""
+    wait = np.empty(len(first))
     for k in range(len(first)):
-        i, j, wait = first[k], second[k], rectangle[second[k], T] - rectangle[first[k], T]
+        i, j = first[k], second[k]
         most = np.cos(min(CROSSING_RAD + turned[k], np.pi / 2))
         if not _cosine(rectangle, i, j) > most:
+            wait[k] = rectangle[j, T] - rectangle[i, T]
             continue
         low, high = _around(track, rectangle, i)
         begin, end = _around(track, rectangle, j)
-        best = PET_S
+        wait[k] = PET_S
         for b in range(begin, end):
             for a in range(low, high):
                 later = abs(rectangle[b, T] - rectangle[a, T])
-                if later < best and not _cosine(rectangle, a, b) > most and _overlap(rectangle, a, b):
-                    best = later
-        longer[k] = max(best - wait, 0.0)
-    return longer
+                if later < wait[k] and not _cosine(rectangle, a, b) > most and _overlap(rectangle, a, b):
+                    wait[k] = later
+    return wait
 
 
 @inlined
