@@ -133,7 +133,7 @@ def _print(report: dict[str, Any]) -> None:
         numbers = [place[name] for name in ("m_per_px_away", "m_per_px_across", "position_sigma_m")]
         x, y = place["picture_px"]
         cells = [f"{number:.3f}" for number in numbers]
-        table.add_row(place["where"], f"{x:g}, {y:g}", *cells, f"{place['speed_sigma_percent']:.2f}")
+        table.add_row(place["where"], f"{x:g}, {y:g}", *cells, _number(place["speed_sigma_percent"]))
     console.print(table)
     camera = report["camera"]
     if camera is None:
@@ -143,7 +143,7 @@ def _print(report: dict[str, Any]) -> None:
     else:
         console.print(
             f"The camera is {camera['height_m']:.2f} m above the road (standard deviation "
-            f"{camera['height_sigma_m']:.2f} m); its focal length is {camera['focal_px']:.0f} px."
+            f"{_number(camera['height_sigma_m'])} m); its focal length is {camera['focal_px']:.0f} px."
         )
     lens = report["lens"]
     if lens is not None:
@@ -157,3 +157,7 @@ def _print(report: dict[str, Any]) -> None:
             console.print(f"{saying.found[0].upper()}{saying.found[1:]}.")
     for line in report["warnings"]:
         console.print(f"[bold]Note:[/bold] {escape(line)}")
+
+
+def _number(value: float | None) -> str:
+    return "not known" if value is None else f"{value:.2f}"

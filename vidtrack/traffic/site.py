@@ -105,6 +105,10 @@ class Calibration(Group):
             raise ValueError("without ground points at least 2 directions and 1 length are needed")
         elif len(self.across) < 2 and (self.across or self.focal_px is None):
             raise ValueError("give at least 2 segments across, or none and focal_px")
+        ends = [(name, *segment) for name in ("directions", "across") for segment in getattr(self, name)]
+        ends += [("lengths", first, second) for first, second, _ in self.lengths]
+        if dots := [name for name, first, second in ends if first == second]:
+            raise ValueError(f"a segment of {dots[0]} begins and ends in one point")
         if self.distortion == "fit" and len(self.picture) < LEAST_FOR_LENS:
             raise ValueError(f'distortion = "fit" needs at least {LEAST_FOR_LENS} pairs of points')
         if isinstance(self.distortion, tuple) and self.focal_px is None:

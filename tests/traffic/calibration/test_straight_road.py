@@ -100,6 +100,7 @@ def test_a_road_straight_ahead_does_not_tell_the_focal_length():
 
 
 BAD = {
+    "a segment of no length": ({"along": [*ALONG, ((1, 20), (1, 20))]}, "begins and ends in one point"),
     "one direction": ({"along": ALONG[:1]}, "at least 2 directions and 1 length"),
     "no length": ({"lengths": []}, "at least 2 directions and 1 length"),
     "one across": ({"across": ACROSS[:1]}, "at least 2 segments across"),

@@ -63,7 +63,7 @@ def examined(site: Site) -> Account:
         "site": site.camera.name,
         "pairs": [
             {"picture": list(calibration.picture[i]), "ground": list(calibration.ground[i])}
-            | {name: float(values[i]) if np.isfinite(values[i]) else None for name, values in columns.items()}
+            | {name: _finite(values[i]) for name, values in columns.items()}
             for i in range(len(picture))
         ],
         "chi2": check.chi2,
@@ -73,7 +73,7 @@ def examined(site: Site) -> Account:
         "camera": found,
         "lens": lens_told(ground, site, found),
         "homography": homography_told(ground),
-        "places": places(ground, picture),
+        "places": places(ground, fitted),  # wrong pairs may lie above the horizon in the picture
         "warnings": doubts(site, check) + height,
     }
     return Account(ground, report, picture, fitted)
@@ -124,13 +124,13 @@ def places(ground: Ground, picture: Floats) -> list[dict[str, Any]]:
             "m_per_px_away": float(own[i, 0]),
             "m_per_px_across": float(own[i, 1]),
             "position_sigma_m": float(shared[i]),
-            "speed_sigma_percent": float(100 * speed[i]),
+            "speed_sigma_percent": _finite(100 * speed[i]),
         }
         for i, where in enumerate(("near", "middle", "far"))
     ]
 
 
-def camera(ground: Ground) -> dict[str, float] | None:
+def camera(ground: Ground) -> dict[str, Any] | None:
     """Focal length and height of the camera with the height's standard deviation; None where they cannot be told."""
     pose = ground.pose()
     if pose is None:
@@ -140,11 +140,11 @@ def camera(ground: Ground) -> dict[str, float] | None:
     return {
         "focal_px": pose.focal_px,
         "height_m": pose.height_m,
-        "height_sigma_m": float(np.linalg.norm(changes)),
+        "height_sigma_m": _finite(float(np.linalg.norm(changes))),
     }
 
 
-def lens_told(ground: Ground, site: Site, found: dict[str, float] | None) -> dict[str, float] | None:
+def lens_told(ground: Ground, site: Site, found: dict[str, Any] | None) -> dict[str, float] | None:
     """k1 and k2 of the lens in focal lengths of the camera, if it was found, and by how much the picture's corner is
     moved outwards, with standard deviations where the points told the lens; None without a lens."""
     lens = ground.lens
@@ -174,9 +174,9 @@ def homography_told(ground: Ground) -> dict[str, Any]:
     }
 
 
-def height_doubt(found: dict[str, float] | None, stated_m: float | None) -> list[str]:
+def height_doubt(found: dict[str, Any] | None, stated_m: float | None) -> list[str]:
     """A word about a stated height of the camera that the points contradict."""
-    if found is None or stated_m is None:
+    if found is None or stated_m is None or found["height_sigma_m"] is None:
         return []
     off, sigma = abs(found["height_m"] - stated_m), found["height_sigma_m"]
     if off**2 <= chdtri(1, _HEIGHT_FALSE_ALARM) * sigma**2 or off <= _HEIGHT_SHARE * stated_m:
@@ -199,3 +199,8 @@ def _speed_share(ground: Ground, xy: Floats) -> Floats:
     e = np.column_stack([np.cos(angles), np.sin(angles)])
     along = np.einsum("ai,aj,injp->anp", e, e, changes)
     return np.asarray(np.linalg.norm(along, axis=2).max(axis=0))
+
+
+def _finite(value: float) -> float | None:
+    """A number for a report; None where it is not known."""
+    return float(value) if np.isfinite(value) else None

@@ -76,6 +76,11 @@ def calibrated(site: Site) -> Ground:
 def solved(pairs: Pairs) -> Fit:
     """The fit through all pairs. Raises ConfigError where there is none that a camera above the road sees."""
     _, fit = pairs.best()
+    if pairs.free and not np.isfinite([*fit.k, *pairs.p.ravel()]).all():
+        raise ConfigError(
+            'calibration: distortion = "fit", but the lens that fits the pairs best folds the picture back inside '
+            "them: some are wrong; without distortion each is compared with the others; or state k1 and k2"
+        )
     variance = np.linalg.eigvalsh(fit.cov)
     if not np.isfinite(fit.k).all() or variance[0] <= _LEAST_SHARE**2 * variance[-1]:
         raise ConfigError(
@@ -188,9 +193,8 @@ def _lens_instead(pairs: Pairs, wrong: list[int]) -> Lens | None:
     count, spare = len(pairs.X), 2 * len(pairs.X) - 9
     if pairs.free or pairs.lens.bends or count < LEAST_FOR_LENS:
         return None
-    try:
-        seen, fit = pairs.with_free_lens().best()
-    except ConfigError:  # it would fold the picture back
+    seen, fit = pairs.with_free_lens().best()
+    if not np.isfinite(seen.p).all():  # it would fold the picture back
         return None
     _, rest = pairs.best(np.delete(np.arange(count), wrong))
     better = fit.chi2 < rest.chi2 + (2 * len(wrong) - 1) * math.log(2 * count)
@@ -202,8 +206,13 @@ def _too_large(chi2: float, spare: int) -> bool:
 
 
 def _left_out(pairs: Pairs, rest: Ints, i: int) -> tuple[float, float, float]:
-    """Distance of a pair from where the rest puts it [px, m], and its square over its covariance."""
+    """Distance of a pair from where the rest puts it [px, m], and its square over its covariance.
+
+    NaN, NaN and infinite where the rest has a lens that shows nothing there.
+    """
     pairs, fit = pairs.best(rest)
+    if not np.isfinite([*fit.k, *pairs.p[i]]).all():
+        return np.nan, np.nan, np.inf
     off = (picture_of(fit.k, pairs.X[[i]]) - pairs.p[[i]])[0]
     J = pairs.by_fit(fit.k)[i]
     cov = pairs.residual_cov(fit.k)[i] + J @ fit.cov @ J.T

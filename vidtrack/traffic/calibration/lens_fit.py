@@ -24,6 +24,8 @@ def fitted_with_lens(
     plane_cov  (N, 2, 2) of the points on the plane
     view       normalised coordinates of the picture without distortion, those of k
     lens       whose k1 is looked for; the fit's covariance is (9, 9), of k and k1
+
+    Where there is no fit, all is NaN and chi-square infinite.
     """
     from scipy.optimize import least_squares  # slow to import, and few runs need it
 
@@ -42,15 +44,18 @@ def fitted_with_lens(
         return whitening(J, plane_cov, sigma_px**2 * np.eye(2))
 
     theta = np.append(start(X, view.into(shown)), 0.0)
-    for _ in range(_REWEIGHTINGS):
+    try:
+        for _ in range(_REWEIGHTINGS):
+            root = weights(theta)
+            theta = least_squares(
+                lambda theta, root=root: np.einsum("nij,nj->ni", root, off(theta)).ravel(),
+                theta,
+                jac=lambda theta, root=root: (root @ derivative(theta)).reshape(-1, 9),
+                method="lm",
+            ).x
         root = weights(theta)
-        theta = least_squares(
-            lambda theta, root=root: np.einsum("nij,nj->ni", root, off(theta)).ravel(),
-            theta,
-            jac=lambda theta, root=root: (root @ derivative(theta)).reshape(-1, 9),
-            method="lm",
-        ).x
-    root = weights(theta)
-    J, residual = (root @ derivative(theta)).reshape(-1, 9), np.einsum("nij,nj->ni", root, off(theta))
-    cov = np.asarray(np.linalg.pinv(J.T @ J, hermitian=True))
+        J, residual = (root @ derivative(theta)).reshape(-1, 9), np.einsum("nij,nj->ni", root, off(theta))
+        cov = np.asarray(np.linalg.pinv(J.T @ J, hermitian=True))
+    except (np.linalg.LinAlgError, ValueError):  # wrong points led to where nothing is finite
+        return replace(lens, k1=np.nan), Fit(np.full(8, np.nan), np.full((9, 9), np.nan), np.inf)
     return replace(lens, k1=float(theta[8])), Fit(theta[:8], cov, float(np.sum(residual**2)))

@@ -56,19 +56,14 @@ class Pairs:
         return self.through(lens), fit
 
     def through(self, lens: Lens) -> Pairs:
-        """The same pairs seen through another lens. Raises ConfigError where it folds the picture back."""
+        """The same pairs seen through another lens; p is NaN where it would fold the picture back."""
         straight = lens.straight(self.shown)
-        if not np.isfinite(straight).all():
-            raise ConfigError(
-                'calibration: with distortion = "fit" the lens would fold the picture back inside its own points; '
-                "check these, or state k1 and k2"
-            )
         bend = np.linalg.inv(lens.jacobian(straight))
         cov = np.asarray(bend @ np.swapaxes(bend, 1, 2) * (self.sigma_px / self.picture.scale) ** 2)
         return replace(self, p=self.picture.into(straight), picture_cov=cov, lens=lens)
 
     def with_free_lens(self) -> Pairs:
-        """The same pairs with the lens that fits them best. Raises ConfigError where it folds the picture back."""
+        """The same pairs with the lens that fits them best."""
         return replace(self, free=True).best()[0]
 
     def residual_cov(self, k: Floats) -> Floats:
