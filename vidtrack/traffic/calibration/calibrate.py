@@ -140,7 +140,9 @@ def doubts(site: Site, check: Check) -> list[str]:
         said.append("4 pairs of points leave nothing to check the calibration with; give a fifth, better eight")
     for i in check.wrong:
         (x, y), (east, north) = calibration.picture[i], calibration.ground[i]
-        off = f"{check.without_px[i]:.1f} px ({check.without_m[i]:.2f} m)"
+        px, m = check.without_px[i], check.without_m[i]
+        off = f"{px:.1f} px" if np.isfinite(px) else "far"
+        off += f" ({m:.2f} m)" if np.isfinite(m) else ""
         said.append(
             f"pair {i + 1} of the calibration, picture ({x:g}, {y:g}) and ground ({east:g}, {north:g}), is {off} from "
             "where the other pairs put it; correct it or leave it out"
