@@ -8,6 +8,7 @@ are normalised: their origin is the centre of the points, so that w = 1 there, a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,21 +121,41 @@ def fitted(X: Floats, p: Floats, plane_cov: Floats, picture_cov: Floats) -> Fit:
     plane_cov, picture_cov   (N, 2, 2) covariances. The residual in the picture has picture_cov + J plane_cov J', with
     J from the fit before: over the error of a point the map from the plane to the picture is nearly straight.
     """
+    return Fit(
+        *reweighted(
+            start(X, p),
+            lambda k: picture_of(k, X) - p,
+            lambda k: by_k(k, X),
+            lambda k: whitening(by_point(k, X), plane_cov, picture_cov),
+        )
+    )
+
+
+def reweighted(
+    theta: Floats,
+    off: Callable[[Floats], Floats],
+    derivative: Callable[[Floats], Floats],
+    weights: Callable[[Floats], Floats],
+) -> tuple[Floats, Floats, float]:
+    """Least squares from theta (E,): the parameters, their covariance (E, E) and chi-square.
+
+    off, derivative, weights   of theta: residuals (N, 2), their derivatives (N, 2, E), and the inverse square roots
+                               (N, 2, 2) of their covariances, which are those of the fit before
+    """
     from scipy.optimize import least_squares  # slow to import, and few runs need it
 
-    k = start(X, p)
     for _ in range(_REWEIGHTINGS):
-        root = whitening(by_point(k, X), plane_cov, picture_cov)
-        k = least_squares(
-            lambda k, root=root: np.einsum("nij,nj->ni", root, picture_of(k, X) - p).ravel(),
-            k,
-            jac=lambda k, root=root: (root @ by_k(k, X)).reshape(-1, 8),
+        root = weights(theta)
+        theta = least_squares(
+            lambda theta, root=root: np.einsum("nij,nj->ni", root, off(theta)).ravel(),
+            theta,
+            jac=lambda theta, root=root: (root @ derivative(theta)).reshape(-1, len(theta)),
             method="lm",
         ).x
-    root = whitening(by_point(k, X), plane_cov, picture_cov)
-    J = (root @ by_k(k, X)).reshape(-1, 8)
-    residual = np.einsum("nij,nj->ni", root, picture_of(k, X) - p)
-    return Fit(k, np.asarray(np.linalg.pinv(J.T @ J, hermitian=True)), float(np.sum(residual**2)))
+    root = weights(theta)
+    J = (root @ derivative(theta)).reshape(-1, len(theta))
+    residual = np.einsum("nij,nj->ni", root, off(theta))
+    return theta, np.asarray(np.linalg.pinv(J.T @ J, hermitian=True)), float(np.sum(residual**2))
 
 
 def whitening(J: Floats, plane_cov: Floats, picture_cov: Floats) -> Floats:

@@ -10,10 +10,17 @@ from dataclasses import replace
 import numpy as np
 
 from vidtrack.arrays.types import Floats
-from vidtrack.traffic.calibration.homography import Fit, Normal, by_k, by_point, picture_of, start, whitening
+from vidtrack.traffic.calibration.homography import (
+    Fit,
+    Normal,
+    by_k,
+    by_point,
+    picture_of,
+    reweighted,
+    start,
+    whitening,
+)
 from vidtrack.traffic.calibration.lens import Lens
-
-_REWEIGHTINGS = 4
 
 
 def fitted_with_lens(
@@ -27,7 +34,6 @@ def fitted_with_lens(
 
     Where there is no fit, all is NaN and chi-square infinite.
     """
-    from scipy.optimize import least_squares  # slow to import, and few runs need it
 
     def off(theta: Floats) -> Floats:
         straight = view.back(picture_of(theta[:8], X))
@@ -43,19 +49,8 @@ def fitted_with_lens(
         J = replace(lens, k1=theta[8]).jacobian(straight) @ by_point(theta[:8], X) * view.scale
         return whitening(J, plane_cov, sigma_px**2 * np.eye(2))
 
-    theta = np.append(start(X, view.into(shown)), 0.0)
     try:
-        for _ in range(_REWEIGHTINGS):
-            root = weights(theta)
-            theta = least_squares(
-                lambda theta, root=root: np.einsum("nij,nj->ni", root, off(theta)).ravel(),
-                theta,
-                jac=lambda theta, root=root: (root @ derivative(theta)).reshape(-1, 9),
-                method="lm",
-            ).x
-        root = weights(theta)
-        J, residual = (root @ derivative(theta)).reshape(-1, 9), np.einsum("nij,nj->ni", root, off(theta))
-        cov = np.asarray(np.linalg.pinv(J.T @ J, hermitian=True))
+        theta, cov, chi2 = reweighted(np.append(start(X, view.into(shown)), 0.0), off, derivative, weights)
     except (np.linalg.LinAlgError, ValueError):  # wrong points led to where nothing is finite
         return replace(lens, k1=np.nan), Fit(np.full(8, np.nan), np.full((9, 9), np.nan), np.inf)
-    return replace(lens, k1=float(theta[8])), Fit(theta[:8], cov, float(np.sum(residual**2)))
+    return replace(lens, k1=float(theta[8])), Fit(theta[:8], cov, chi2)

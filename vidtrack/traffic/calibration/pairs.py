@@ -63,8 +63,8 @@ class Pairs:
         return replace(self, p=self.picture.into(straight), picture_cov=cov, lens=lens)
 
     def with_free_lens(self) -> Pairs:
-        """The same pairs with the lens that fits them best."""
-        return replace(self, free=True).best()[0]
+        """The same pairs, whose lens is yet to be fitted."""
+        return replace(self, free=True)
 
     def residual_cov(self, k: Floats) -> Floats:
         """(N, 2, 2) of both points, in the normalised picture."""
@@ -97,7 +97,7 @@ def pairs_of(site: Site) -> Pairs:
         one * (sigma_px / view.scale) ** 2, shown, sigma_px, lens, free=False,
     )  # fmt: skip
     if calibration.distortion == "fit":
-        return pairs.with_free_lens()
+        return pairs.with_free_lens().best()[0]
     return pairs.through(lens) if lens.bends else pairs
 
 
