@@ -151,12 +151,19 @@ def kept(settings: Settings, masked: Sequence[Corners] = (), width: int = 0, hei
 def look_ahead(source: Source, detector: Background, settings: Settings, *, whole: bool = False) -> None:
     """Show the first seconds of a video, of which the source may be a slice, to a detector that learns the scene.
 
-    whole  whether anything but the detector looks at the pictures: else they may be kept as it reduces them
+    whole  whether anything but the detector looks at the pictures: else they come as it reduces them
     """
+    if not whole:
+        read_reduced(source, detector)
     seconds = settings.detector.disturbance.preview_s
     if isinstance(detector, Disturbance) and seconds:
-        keep = Frame.copy if whole else detector.kept
-        detector.preview(source.opening(seconds, settings.source.end_s, PREVIEW_EVERY_S, keep))
+        detector.preview(source.opening(seconds, settings.source.end_s, PREVIEW_EVERY_S))
+
+
+def read_reduced(source: Source, detector: Background) -> None:
+    """Let the thread that reads a video reduce its pictures for a detector, when nothing else looks at them."""
+    if isinstance(detector, Disturbance):
+        source.reduce_by(detector.reduced)
 
 
 def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker, settings: Settings) -> Iterator[Step]:

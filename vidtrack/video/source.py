@@ -113,7 +113,8 @@ class Source:
         self._first = first
         self.height, self.width = first.shape
         self.frames = None if pictures.frames is None else len(self._span.frames(self.fps, pictures.frames))
-        self._ahead = ReadAhead(self._alike(self._in_span(chain([first], frames)), first), _DEPTH)
+        self._reduce: Callable[[Frame], Frame] | None = None
+        self._ahead = ReadAhead(self._reduced(self._alike(self._in_span(chain([first], frames)), first)), _DEPTH)
         self._opened: deque[Frame] = deque()  # frames of the opening, kept for the reading
 
     def __iter__(self) -> Source:
@@ -132,40 +133,47 @@ class Source:
     ) -> None:
         self.close()
 
-    def opening(
-        self,
-        seconds: float,
-        end_s: float | None,
-        every_s: float = 0.0,
-        keep: Callable[[Frame], Frame] = Frame.copy,
-    ) -> Iterator[Frame]:
+    def reduce_by(self, reduce: Callable[[Frame], Frame]) -> None:
+        """Bring frames, from the next but some on, as what `reduce` makes of them in the thread that reads.
+
+        It returns a frame with the same picture, or with a smaller one in memory of its own.
+        """
+        reduce(self._first)  # it may note the size, which is for one thread
+        self._reduce = reduce
+
+    def opening(self, seconds: float, end_s: float | None, every_s: float = 0.0) -> Iterator[Frame]:
         """The frames of its first seconds, at most to end_s, before it is iterated.
 
-        They are kept until then, as what `keep` makes of them, if they are few or small. Others are read twice: their
-        numbers are 0, and some of those less than `every_s` apart may be missing.
+        They are kept until then if they are few or small. Others are read twice: their numbers are 0, and some of those
+        less than `every_s` apart may be missing.
         """
         begin_s = self._span.start_s
         end_s = begin_s + seconds if end_s is None else min(end_s, begin_s + seconds)
-        size = (end_s - begin_s) * self.fps * keep(self._first).nbytes
+        size = (end_s - begin_s) * self.fps * self._own(self._first).nbytes
         if end_s <= self._span.end_s and size <= _KEPT_BYTES:
-            yield from self._kept(end_s, keep)
+            yield from self._kept(end_s)
             return
         with closing(_pictures(self._path, self._settings, SourceStats(told=True))) as again:
             for picture in again.between(begin_s, end_s, every_s):
                 yield matched(to_frame(0, *picture), self._first)
 
-    def _kept(self, end_s: float, keep: Callable[[Frame], Frame]) -> Iterator[Frame]:
+    def _kept(self, end_s: float) -> Iterator[Frame]:
         """The frames to end_s, each kept for the reading; so is the one after them, since it is read by then.
 
         There are fewer where pictures come so much faster than the stated rate that they would be too large.
         """
         held = 0
-        for frame in map(keep, self._ahead):
+        for frame in map(self._own, self._ahead):
             self._opened.append(frame)
             held += frame.nbytes
             if frame.time_s > end_s + ROUNDING_S or held > _KEPT_BYTES:
                 break
             yield frame
+
+    def _own(self, frame: Frame) -> Frame:
+        """The frame, reduced if possible, in memory of its own."""
+        small = self._reduce(frame) if self._reduce else frame
+        return small.copy() if small.whole is None else small
 
     def close(self) -> None:
         """Stop reading; may be called at any time and again."""
@@ -185,6 +193,9 @@ class Source:
                 yield frame
         if empty:
             raise SourceError(f"{self.name} has no frame between {self._span}; the last one read is at {last_s:g} s")
+
+    def _reduced(self, frames: Iterator[Frame]) -> Iterator[Frame]:
+        return (self._reduce(frame) if self._reduce else frame for frame in frames)
 
     def _alike(self, frames: Iterator[Frame], first: Frame) -> Iterator[Frame]:
         """All frames converted to the size and kind of the first, with one warning."""

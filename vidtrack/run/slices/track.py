@@ -14,7 +14,7 @@ from vidtrack.output.folder import writing
 from vidtrack.run.slices.cuts import Cut
 from vidtrack.run.slices.kept import About, KeptSteps
 from vidtrack.run.trackers import build_blob_tracker
-from vidtrack.run.video import build_detector, look_ahead, video_steps
+from vidtrack.run.video import build_detector, look_ahead, read_reduced, video_steps
 from vidtrack.state import gather, read_state, restore, write_state
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.traffic.lines import parse_lines
@@ -62,6 +62,7 @@ def track_slice(
                 look_ahead(source, detector, settings)
             else:
                 restore(both, read_state(before / STATE))
+                read_reduced(source, detector)
             for step in video_steps(frames, detector, tracker, settings):
                 count += 1
                 if step.time_s >= cut.kept_from_s:

@@ -111,9 +111,12 @@ class Disturbance:
             shown = [relit(picture, self._scene, black) for picture in learnt] if self._settings.exposure else learnt
             self._scene = patched(self._scene, shown)
 
-    def kept(self, frame: Frame) -> Frame:
-        """The frame with no more of its picture than `preview` and `apply` look at, in memory of its own."""
-        return self._view.kept(frame)
+    def reduced(self, frame: Frame) -> Frame:
+        """The frame with no more of its picture than `preview` and `apply` look at; itself, if they look at all of it.
+
+        Any thread may call it, once it has returned for the first frame.
+        """
+        return self._view.reduced_frame(frame)
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
         """Foreground of `frame`; pixels in `known` boxes (K, 4) [scene px] are never absorbed into the scene."""

@@ -80,11 +80,11 @@ class View:
             self.black = 0 if frame.full_range else _VIDEO_BLACK
         return reduce(frame, self.step)
 
-    def kept(self, frame: Frame) -> Frame:
-        """The frame with the planes that `reduce` makes of it, in memory of their own."""
+    def reduced_frame(self, frame: Frame) -> Frame:
+        """The frame with the planes that `reduce` makes of it; itself, if they are its own."""
         picture = self.reduce(frame)
-        if self.step == 1:
-            return frame.copy()
+        if picture.luma is frame.y:
+            return frame
         u, v = (None if plane is None else small for plane, small in zip((frame.u, frame.v), picture[1:], strict=True))
         return replace(frame, y=picture.luma, u=u, v=v, whole=frame.shape)
 

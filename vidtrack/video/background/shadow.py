@@ -171,8 +171,9 @@ def _compare_texture(
         missed[x], _ = _texture(luma, scene, up, y, down, x - _ONE, x, x + _ONE, r[x])
     for x in range(max(begin, _ONE), min(end, last)):
         _, left[x] = _texture(luma, scene, up, y, down, x - _ONE, x, x + _ONE, r[x])
-    for x in (np.uint64(0), last):  # one-sided
-        missed[x], left[x] = _texture(luma, scene, up, y, down, max(x, _ONE) - _ONE, x, min(x + _ONE, last), r[x])
+    for edge in (np.uint64(0), last):  # one-sided
+        before, after = max(edge, _ONE) - _ONE, min(edge + _ONE, last)
+        missed[edge], left[edge] = _texture(luma, scene, up, y, down, before, edge, after, r[edge])
 
 
 @inlined
