@@ -29,7 +29,8 @@ class Step:
 
     index       frame number from 0, or the scan's number
     scan, tracks   in pixels of the scene, which is the first picture, or in metres (radar)
-    frame, foreground   None for stored detections and radar plots
+    frame, foreground   None for stored detections and radar plots; the frame's picture is whole if an output of the run
+                shows it (`Extras.shows`), else it may be the detector's reduction
     stage_s     processing time of each stage [s]
     motion      (2, 3) affine map from the scene to this picture [px]; None: identity
     warnings    new warnings for the user

@@ -75,10 +75,10 @@ def _find_runs(words: Words, rest: np.uint64, outside: np.uint64, w: int, row: R
 
 @kernel
 def find_stretches(mask: Image) -> tuple[Runs, Runs, Runs]:
-    """Horizontal runs of blocks of pixels with any that is not 0: row, start, stop.
+    """Horizontal runs of blocks of 32 pixels with any that is not 0: row, start, stop.
 
-    A fifth of the time of `find_runs`, and long enough for vectorised loops over all pixels within. mask (h, w) uint8;
-    each (N,) int32 in raster order, stop excluded.
+    They are found faster than `find_runs` finds runs, and are long enough for vectorised loops over the pixels within.
+    mask (h, w) uint8; each (N,) int32 in raster order, stop excluded.
     """
     w, size = mask.shape[1], mask.size
     words = mask.ravel()[: size // _BLOCK * _BLOCK].view(np.uint64)

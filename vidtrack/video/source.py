@@ -134,9 +134,9 @@ class Source:
         self.close()
 
     def reduce_by(self, reduce: Callable[[Frame], Frame]) -> None:
-        """Bring frames, from the next but some on, as what `reduce` makes of them in the thread that reads.
+        """From now on the thread that reads passes each frame through `reduce`; a few that it has read come as they are.
 
-        It returns a frame with the same picture, or with a smaller one in memory of its own.
+        `reduce` returns a frame with the same picture, or with a smaller one in memory of its own.
         """
         reduce(self._first)  # it may note the size, which is for one thread
         self._reduce = reduce

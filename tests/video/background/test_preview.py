@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from threading import get_ident
 
 import cv2
 import numpy as np
@@ -15,6 +16,7 @@ from vidtrack.config.settings import SourceSettings
 from vidtrack.config.video import DetectorSettings
 from vidtrack.errors import ConfigError
 from vidtrack.run.video import build_detector, look_ahead, track
+from vidtrack.video import source as source_module
 from vidtrack.video.background import create
 from vidtrack.video.background.shadow import _HARD as HARD
 from vidtrack.video.background.shadow import SOFT, Sunlight
@@ -191,6 +193,35 @@ def test_pictures_that_are_read_reduced_show_the_detector_what_whole_ones_do(tmp
     assert preview_s == 0 or shapes[1] == [(full, half)] * 20
     assert np.any(masks[0])
     np.testing.assert_array_equal(masks[0], masks[1])
+
+
+def test_frames_are_first_reduced_by_the_caller_then_by_the_reading_thread(tmp_path):
+    for k in range(30):
+        cv2.imwrite(str(tmp_path / f"{k:03d}.png"), np.full((48, 64), k, np.uint8))
+    threads = []
+
+    def noted(frame):
+        threads.append(get_ident())
+        return frame
+
+    with open_source(str(tmp_path), SourceSettings(fps=10)) as source:
+        source.reduce_by(noted)
+        assert threads[0] == get_ident()
+        assert [frame.y[0, 0] for frame in source] == list(range(30))
+    later = set(threads[1:])
+    assert len(later) == 1
+    assert get_ident() not in later
+
+
+def test_the_frames_of_an_opening_are_in_memory_of_their_own(tmp_path, monkeypatch):
+    decoded, matched_as_before = [], source_module.matched
+    monkeypatch.setattr(source_module, "matched", lambda *of: decoded.append(matched_as_before(*of)) or decoded[-1])
+    for k in range(6):
+        cv2.imwrite(str(tmp_path / f"{k:03d}.png"), np.full((48, 64), k, np.uint8))
+    with open_source(str(tmp_path), SourceSettings(fps=10)) as source:
+        ahead = list(source.opening(0.5, None))
+    assert len(ahead) == 6
+    assert not any(np.shares_memory(held.y, frame.y) for held in ahead for frame in decoded)
 
 
 def test_a_camera_has_no_preview_and_zero_seconds_are_none(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vidtrack.video.background.picture import Picture
-from vidtrack.video.background.scene import BEAM, SHADOW, UNSEEN, Scene, learn
+from vidtrack.video.background.scene import BEAM, SHADOW, UNSEEN, Scene, learn, spare
 
 WEIGHT, NOISE_WEIGHT, DT = np.float32(0.1), np.float32(0.05), np.float32(0.04)
 
@@ -47,3 +47,26 @@ def test_free_pixels_are_averaged_and_covered_ones_are_counted(shape):
     }
     for name, plane in expected.items():
         assert np.allclose(getattr(scene, name), plane, rtol=1e-5, atol=1e-4), name
+
+
+@pytest.mark.parametrize(
+    ("box", "inside"),
+    [
+        ((3, 2, 4, 2), np.s_[2:5, 3:8]),
+        ((-5, -5, 7, 8), np.s_[:4, :3]),
+        ((8.5, 5.5, 50, 50), np.s_[5:, 8:]),
+        ((-50, 2, 20, 2), np.s_[:0, :0]),
+        ((3, -50, 4, 20), np.s_[:0, :0]),
+        ((40, 2, 4, 2), np.s_[:0, :0]),
+        ((3, 40, 4, 2), np.s_[:0, :0]),
+        ((2, 2, 1e19, 2), np.s_[:0, :0]),
+        ((2, 2, 4, 1e19), np.s_[:0, :0]),
+        ((2, 2, np.nan, np.nan), np.s_[:0, :0]),
+    ],
+)
+def test_cover_is_limited_inside_boxes_also_beyond_each_side(box, inside):
+    covered_s = np.random.default_rng(1).random((9, 12)).astype(np.float32)
+    expected = covered_s.copy()
+    expected[inside] = np.minimum(expected[inside], np.float32(0.3))
+    spare(covered_s, np.array([box], float), np.float32(0.3))
+    np.testing.assert_array_equal(covered_s, expected)

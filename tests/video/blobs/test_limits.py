@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from vidtrack.config.video import DetectorSettings
 from vidtrack.tracking.picture.road import Road
+from vidtrack.video.background import create
 from vidtrack.video.blobs.limits import LimitChecks
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame
@@ -20,6 +22,19 @@ def said(level, road, seconds=20):
 
 def test_a_dark_picture_is_said_once():
     assert len([what for what in said(20, Road(160, 120)) if "black" in what]) == 1
+
+
+def test_noise_is_dark_whether_or_not_the_picture_comes_reduced():
+    detector, told = create(DetectorSettings(), 0.5), []
+    noise = np.random.default_rng(3).normal(26, 12, (30, 120, 160)).clip(0, 255).astype(np.uint8)
+    for reduced in (False, True):
+        checks = LimitChecks()
+        frames = [Frame(k, float(k), picture) for k, picture in enumerate(noise)]
+        shown = [detector.reduced(frame) for frame in frames] if reduced else frames
+        half = Foreground(EMPTY[::2, ::2], EMPTY[::2, ::2].astype(np.float32), 2)
+        told.append([(frame.index, what) for frame in shown for what in checks.look(frame, half, Road(160, 120))])
+    assert told[0] == told[1]
+    assert len(told[0]) == 1
 
 
 def test_an_ordinary_picture_is_not_worth_a_word():

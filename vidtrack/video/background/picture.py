@@ -83,7 +83,7 @@ class View:
     def reduced_frame(self, frame: Frame) -> Frame:
         """The frame with the planes that `reduce` makes of it; itself, if they are its own."""
         picture = self.reduce(frame)
-        if picture.luma is frame.y:
+        if self.step == 1 or frame.whole is not None:
             return frame
         u, v = (None if plane is None else small for plane, small in zip((frame.u, frame.v), picture[1:], strict=True))
         return replace(frame, y=picture.luma, u=u, v=v, whole=frame.shape)

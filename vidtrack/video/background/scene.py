@@ -159,7 +159,7 @@ def spare(covered_s: Levels, box: Floats, longest_s: np.float32) -> None:
     h, w = covered_s.shape
     for left, top, width, height in box:
         begin, end = np.uint64(max(int(left), 0)), np.uint64(max(min(int(left + width + 1), w), 0))
-        for y in range(max(int(top), 0), min(int(top + height + 1), h)):
+        for y in range(max(int(top), 0), max(min(int(top + height + 1), h), 0)):
             for x in range(begin, end):  # without a sign it is vectorised
                 covered_s[y, x] = min(covered_s[y, x], longest_s)
 

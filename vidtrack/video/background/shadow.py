@@ -101,7 +101,7 @@ def mark_shadow(picture: Picture, scene: Scene, air: Air, tolerance: Tolerance, 
 
     r = (Y - black) / (B - black); texture is the luminance differences over +-1 px, across and down.
     Returns (_BINS + 1,): the number of pixels, by r, in which the scene's structure is seen, and that of all in which
-    there is structure and less light. Each loop writes one array: it is vectorised then.
+    there is structure and less light. Each loop over the pixels of a stretch writes one array: it is vectorised then.
     """
     w, coloured, doubled = hit.shape[1], len(picture.cb) > 0, np.uint64(len(hit))
     count, seen = np.zeros(_BINS + 1), np.empty(w, np.uint8)
@@ -145,7 +145,7 @@ def mark_shadow(picture: Picture, scene: Scene, air: Air, tolerance: Tolerance, 
                     count[int(r[x] * _BINS)] += 1
         for x in range(begin, end):
             light = scene.luma[y, x] - air.black[y, x]
-            dark = (r[x] >= _DARKEST) & (r[x] >= tolerance.darkest + air.spread[y, x] * fainter) & (r[x] < _LIGHTEST)
+            dark = (r[x] >= tolerance.darkest + air.spread[y, x] * fainter) & (r[x] < _LIGHTEST)
             fits = off[x] < _CHROMA + tolerance.chroma_share * tint[x]
             hit[y, x] += np.uint8(dark & fits & (missed[x] < tolerance.texture + share * light))
     return count

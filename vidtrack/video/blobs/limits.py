@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.tracking.picture.road import Road
+from vidtrack.video.background.picture import reduce
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame
 
@@ -29,7 +30,7 @@ class LimitChecks:
             return ()
         self._due_s = frame.time_s + _EVERY_S
         seen = {
-            "dark": (_is_dark(frame), "the picture is nearly black; unlit vehicles are not seen"),
+            "dark": (_is_dark(frame, foreground.step), "the picture is nearly black; unlit vehicles are not seen"),
             "small": (
                 _are_small(foreground, road),
                 "vehicles are only a few pixels large; --scale 1 may show them better",
@@ -47,9 +48,10 @@ class LimitChecks:
         return tuple(said)
 
 
-def _is_dark(frame: Frame) -> bool:
-    black = 0 if frame.full_range else 16
-    return float(np.percentile(frame.y[::_THIN, ::_THIN], 95)) - black < _DARK
+def _is_dark(frame: Frame, step: int) -> bool:
+    """Whether a picture is nearly black, as it is after its reduction by step; it may be reduced already."""
+    black, luma = 0 if frame.full_range else 16, reduce(frame, step).luma
+    return float(np.percentile(luma[::_THIN, ::_THIN], 95)) - black < _DARK
 
 
 def _are_small(foreground: Foreground, road: Road) -> bool:
