@@ -134,7 +134,7 @@ class Source:
         self.close()
 
     def reduce_by(self, reduce: Callable[[Frame], Frame]) -> None:
-        """From now on the thread that reads passes each frame through `reduce`; a few that it has read come as they are.
+        """From now on the thread that reads passes frames through `reduce`; a few that it has read come as they are.
 
         `reduce` returns a frame with the same picture, or with a smaller one in memory of its own.
         """
