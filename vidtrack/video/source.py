@@ -113,7 +113,7 @@ class Source:
         self._first = first
         self.height, self.width = first.shape
         self.frames = None if pictures.frames is None else len(self._span.frames(self.fps, pictures.frames))
-        self._reduce: Callable[[Frame], Frame] | None = None
+        self._reduce: Callable[[Frame], Frame] = lambda frame: frame
         self._ahead = ReadAhead(self._reduced(self._alike(self._in_span(chain([first], frames)), first)), _DEPTH)
         self._opened: deque[Frame] = deque()  # frames of the opening, kept for the reading
 
@@ -149,7 +149,7 @@ class Source:
         """
         begin_s = self._span.start_s
         end_s = begin_s + seconds if end_s is None else min(end_s, begin_s + seconds)
-        size = (end_s - begin_s) * self.fps * self._own(self._first).nbytes
+        size = (end_s - begin_s) * self.fps * self._reduce(self._first).nbytes
         if end_s <= self._span.end_s and size <= _KEPT_BYTES:
             yield from self._kept(end_s)
             return
@@ -172,7 +172,7 @@ class Source:
 
     def _own(self, frame: Frame) -> Frame:
         """The frame, reduced if possible, in memory of its own."""
-        small = self._reduce(frame) if self._reduce else frame
+        small = self._reduce(frame)
         return small.copy() if small.whole is None else small
 
     def close(self) -> None:
@@ -195,7 +195,7 @@ class Source:
             raise SourceError(f"{self.name} has no frame between {self._span}; the last one read is at {last_s:g} s")
 
     def _reduced(self, frames: Iterator[Frame]) -> Iterator[Frame]:
-        return (self._reduce(frame) if self._reduce else frame for frame in frames)
+        return (self._reduce(frame) for frame in frames)  # as it is when the frame is read
 
     def _alike(self, frames: Iterator[Frame], first: Frame) -> Iterator[Frame]:
         """All frames converted to the size and kind of the first, with one warning."""

@@ -162,18 +162,19 @@ def _double(chroma: NDArray, y: int, half: Levels, level: Levels) -> None:
 
 @inlined
 def _compare_texture(
-    luma: Image, scene: Levels, y: np.uint64, begin: np.uint64, end: np.uint64, r: Levels, missed: Levels, left: Levels
-) -> None:
-    """`_texture` of row y in the columns from begin to end: fills missed and left (w,) from r (w,)."""
+    luma: Image, scene: Levels, y: np.uint64, begin: np.uint64, end: np.uint64, r: Levels,
+    missed: Levels, structure: Levels,
+) -> None:  # fmt: skip
+    """`_texture` of row y in the columns from begin to end: fills missed and structure (w,) from r (w,)."""
     bottom, last = np.uint64(luma.shape[0]) - _ONE, np.uint64(luma.shape[1]) - _ONE
     up, down = max(y, _ONE) - _ONE, min(y + _ONE, bottom)
     for x in range(max(begin, _ONE), min(end, last)):
         missed[x], _ = _texture(luma, scene, up, y, down, x - _ONE, x, x + _ONE, r[x])
     for x in range(max(begin, _ONE), min(end, last)):
-        _, left[x] = _texture(luma, scene, up, y, down, x - _ONE, x, x + _ONE, r[x])
+        _, structure[x] = _texture(luma, scene, up, y, down, x - _ONE, x, x + _ONE, r[x])
     for edge in (np.uint64(0), last):  # one-sided
         before, after = max(edge, _ONE) - _ONE, min(edge + _ONE, last)
-        missed[edge], left[edge] = _texture(luma, scene, up, y, down, before, edge, after, r[edge])
+        missed[edge], structure[edge] = _texture(luma, scene, up, y, down, before, edge, after, r[edge])
 
 
 @inlined
