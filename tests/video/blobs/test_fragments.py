@@ -17,9 +17,11 @@ NOBODY = np.empty((0, 4))
 
 
 def grouped(box, predicted=NOBODY, typical=CAR, area=None, gap=0.05, link=None, flake=0.0):
-    """Group of each box (R, 4), where it is known that vehicles are as large as `typical`; None: it is not."""
+    """Group of each box (R, 4), where it is known that vehicles are as large as `typical`, everywhere or at each box;
+    None: it is not.
+    """
     box = np.asarray(box, float)
-    usual = np.tile(np.full(2, np.nan) if typical is None else typical, (len(box), 1))
+    usual = np.broadcast_to(np.full(2, np.nan) if typical is None else typical, (len(box), 2)).astype(float)
     area = box[:, 2] * box[:, 3] if area is None else np.asarray(area, float)
     link = np.arange(len(box)) if link is None else np.asarray(link)
     group, count = together(box, area, link, np.asarray(predicted, float), usual, flake, True, 0.7, gap)
@@ -45,6 +47,23 @@ def test_a_flake_is_a_piece_of_nothing():
 @pytest.mark.parametrize("typical", [CAR, None])
 def test_two_regions_that_are_each_like_a_vehicle_are_two_whoever_was_predicted(typical):
     assert grouped([[10, 10, 35, 18], [30, 30, 35, 18]], [[8, 8, 60, 42]], typical, gap=0.5) == [0, 1]
+
+
+def test_a_far_vehicle_beside_a_near_one_is_judged_by_the_sizes_where_it_stands():
+    near, far = [10, 40, 40, 20], [52, 30, 14, 10]
+    there = [CAR, (16.0, 10.0)]
+    for order in ([0, 1], [1, 0]):
+        boxes, usual = [[near, far][k] for k in order], [there[k] for k in order]
+        assert grouped(boxes, [[8, 28, 60, 34]], usual, gap=0.5) == [0, 1]
+        assert grouped(boxes, [[8, 28, 60, 34]], CAR, gap=0.5) == [0, 0]
+
+
+def test_a_roof_above_a_bonnet_is_judged_where_the_bonnet_stands():
+    bonnet, roof = [10, 40, 40, 20], [30, 28, 14, 10]
+    there = [CAR, (16.0, 10.0)]
+    for order in ([0, 1], [1, 0]):
+        boxes, usual = [[bonnet, roof][k] for k in order], [there[k] for k in order]
+        assert grouped(boxes, [[8, 26, 46, 36]], usual, gap=0.5) == [0, 0]
 
 
 def test_a_small_piece_beside_a_vehicle_belongs_to_it_though_nobody_predicted_it():

@@ -172,11 +172,17 @@ def _fit(a: Floats, b: Floats, typical: Floats) -> bool:
 
 @inlined
 def _both_vehicles(i: int, j: int, box: Floats, area: Floats, typical: Floats) -> bool:
-    """Whether two regions are each like a vehicle."""
+    """Whether two regions are each like a vehicle that stands where it does.
+
+    Of two above each other the upper one may be a part of the lower one: both are judged where the lower one stands.
+    """
     a, b = box[i, 2] * box[i, 3], box[j, 2] * box[j, 3]
     if not np.isnan(typical[i, 0]):
-        usual = typical[i, 0] * typical[i, 1]
-        return min(a, b) >= _LIKE * usual
+        at_a, at_b = i, j
+        if _above_each_other(box[i], box[j]):
+            at_a = at_b = i if box[i, 1] + box[i, 3] >= box[j, 1] + box[j, 3] else j
+        large_a = a >= _LIKE * typical[at_a, 0] * typical[at_a, 1]
+        return large_a and b >= _LIKE * typical[at_b, 0] * typical[at_b, 1]
     union = _union(box[i], box[j])
     filled = area[i] > _LIKE_FILL * a and area[j] > _LIKE_FILL * b
     return filled and min(a, b) >= _LIKE_BOX * union and a + b < _APART * union
@@ -203,6 +209,12 @@ def _share_inside(box: Floats, other: Floats) -> float:
         low = other[axis] - (size - other[axis + 2]) / 2
         common *= max(min(box[axis] + box[axis + 2], low + size) - max(box[axis], low), 0.0)
     return common / (box[2] * box[3])
+
+
+@inlined
+def _above_each_other(a: Floats, b: Floats) -> bool:
+    """Whether two boxes have columns in common."""
+    return a[0] < b[0] + b[2] and b[0] < a[0] + a[2]
 
 
 @inlined
