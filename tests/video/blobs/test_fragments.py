@@ -21,7 +21,8 @@ def grouped(box, predicted=NOBODY, typical=CAR, area=None, gap=0.05, link=None, 
     None: it is not.
     """
     box = np.asarray(box, float)
-    usual = np.broadcast_to(np.full(2, np.nan) if typical is None else typical, (len(box), 2)).astype(float)
+    usual = np.empty((len(box), 2))
+    usual[:] = np.nan if typical is None else typical
     area = box[:, 2] * box[:, 3] if area is None else np.asarray(area, float)
     link = np.arange(len(box)) if link is None else np.asarray(link)
     group, count = together(box, area, link, np.asarray(predicted, float), usual, flake, True, 0.7, gap)
@@ -49,21 +50,36 @@ def test_two_regions_that_are_each_like_a_vehicle_are_two_whoever_was_predicted(
     assert grouped([[10, 10, 35, 18], [30, 30, 35, 18]], [[8, 8, 60, 42]], typical, gap=0.5) == [0, 1]
 
 
-def test_a_far_vehicle_beside_a_near_one_is_judged_by_the_sizes_where_it_stands():
-    near, far = [10, 40, 40, 20], [52, 30, 14, 10]
-    there = [CAR, (16.0, 10.0)]
-    for order in ([0, 1], [1, 0]):
-        boxes, usual = [[near, far][k] for k in order], [there[k] for k in order]
-        assert grouped(boxes, [[8, 28, 60, 34]], usual, gap=0.5) == [0, 1]
-        assert grouped(boxes, [[8, 28, 60, 34]], CAR, gap=0.5) == [0, 0]
+FAR_CAR = (16.0, 10.0)
 
 
-def test_a_roof_above_a_bonnet_is_judged_where_the_bonnet_stands():
-    bonnet, roof = [10, 40, 40, 20], [30, 28, 14, 10]
-    there = [CAR, (16.0, 10.0)]
-    for order in ([0, 1], [1, 0]):
-        boxes, usual = [[bonnet, roof][k] for k in order], [there[k] for k in order]
-        assert grouped(boxes, [[8, 26, 46, 36]], usual, gap=0.5) == [0, 0]
+def either_order(boxes, typical):
+    """Groups of two boxes inside one predicted vehicle, which do not depend on their order."""
+    within, ahead = [[8, 5, 60, 60]], grouped(boxes, [[8, 5, 60, 60]], typical, gap=0.5)
+    assert ahead == grouped(boxes[::-1], within, typical[::-1], gap=0.5)
+    return ahead
+
+
+@pytest.mark.parametrize("left", [50, 52])
+def test_a_far_vehicle_beside_a_near_one_is_judged_by_the_size_where_it_stands(left):
+    near, far = [10, 40, 40, 20], [left, 30, 14, 10]
+    assert either_order([near, far], [CAR, FAR_CAR]) == [0, 1]
+    assert either_order([near, far], [CAR, CAR]) == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper"), [([10, 40, 40, 20], [30, 28, 14, 10]), ([10, 40, 40, 20], [49, 30, 14, 10])]
+)
+def test_a_roof_above_a_bonnet_is_judged_by_the_size_where_the_bonnet_stands(lower, upper):
+    assert either_order([lower, upper], [CAR, FAR_CAR]) == [0, 0]
+
+
+@given(st.permutations(range(3)))
+def test_groups_do_not_depend_on_the_order_where_sizes_differ(order):
+    boxes = [[10, 38, 18, 18], [37, 34, 10, 11], [30, 35, 7, 7]]
+    typical = [(36.0, 18.0), (25.0, 12.5), (22.0, 11.0)]
+    group = grouped([boxes[k] for k in order], [[5, 20, 70, 60]], [typical[k] for k in order], gap=0.3)
+    assert [group[order.index(k)] == group[order.index(1)] for k in range(3)] == [False, True, True]
 
 
 def test_a_small_piece_beside_a_vehicle_belongs_to_it_though_nobody_predicted_it():

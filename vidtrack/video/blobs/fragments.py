@@ -75,15 +75,15 @@ def together(
     """Group of each region (R,) and the number of groups; pieces of one vehicle have the same group.
 
     box (R, 4) and area (R,) of the regions, link (R,) the same number for regions that weak foreground links,
-    predicted (K, 4) boxes of vehicles, typical (R, 2) width and height of vehicles at each region, NaN where unknown,
-    flake the longer side up to which regions are flakes or drops, which are pieces of nothing;
+    predicted (K, 4) boxes of vehicles, typical (R, 2) width and height of vehicles at each region, all NaN while
+    unknown, flake the longer side up to which regions are flakes or drops, which are pieces of nothing;
     pieces, overlap, gap: `blobs.pieces`, `join_overlap`, `join_gap`.
 
     Two regions are pieces of one vehicle if they are close together inside one predicted box; or if one is small and
     near the other, and both together are no larger than a vehicle; or if they are linked, not in two predicted boxes,
     and together no larger than a vehicle (while sizes are unknown: one is smaller than the other). Two regions that
-    are each like a vehicle are never pieces. The nearest pieces are joined first; a third region between two vehicles
-    joins the nearer one, not both.
+    are each like a vehicle are not, unless a third one joins them and all fit into one vehicle. The nearest pieces are
+    joined first; a third region between two vehicles joins the nearer one, not both.
     """
     vehicle = np.empty(len(box), np.int64)
     for i in range(len(box)):
@@ -137,8 +137,10 @@ def _nearest_first(apart: list[float]) -> Ints:
 def _one_vehicle(group: Ints, a: int, b: int, box: Floats, area: Floats, typical: Floats) -> bool:
     """Whether the regions of groups a and b can be one vehicle: no two of them are vehicles, or all fit into one."""
     left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
+    usual = 0.0
     for i in range(len(box)):
         if group[i] == a or group[i] == b:
+            usual = max(usual, typical[i, 0] * typical[i, 1])
             left, right = min(left, box[i, 0]), max(right, box[i, 0] + box[i, 2])
             top, bottom = min(top, box[i, 1]), max(bottom, box[i, 1] + box[i, 3])
     union = (right - left) * (bottom - top)
@@ -147,7 +149,7 @@ def _one_vehicle(group: Ints, a: int, b: int, box: Floats, area: Floats, typical
             continue
         for j in range(len(box)):
             if group[j] == b and _both_vehicles(i, j, box, area, typical):
-                return not np.isnan(typical[i, 0]) and union <= _WHOLE * typical[i, 0] * typical[i, 1]
+                return union <= _WHOLE * usual
     return True
 
 
@@ -174,15 +176,14 @@ def _fit(a: Floats, b: Floats, typical: Floats) -> bool:
 def _both_vehicles(i: int, j: int, box: Floats, area: Floats, typical: Floats) -> bool:
     """Whether two regions are each like a vehicle that stands where it does.
 
-    Of two above each other the upper one may be a part of the lower one: both are judged where the lower one stands.
+    Of two that share columns the upper one may be a part of the lower one: both are judged by the larger size.
     """
     a, b = box[i, 2] * box[i, 3], box[j, 2] * box[j, 3]
     if not np.isnan(typical[i, 0]):
-        at_a, at_b = i, j
-        if _above_each_other(box[i], box[j]):
-            at_a = at_b = i if box[i, 1] + box[i, 3] >= box[j, 1] + box[j, 3] else j
-        large_a = a >= _LIKE * typical[at_a, 0] * typical[at_a, 1]
-        return large_a and b >= _LIKE * typical[at_b, 0] * typical[at_b, 1]
+        usual_a, usual_b = typical[i, 0] * typical[i, 1], typical[j, 0] * typical[j, 1]
+        if _share_columns(box[i], box[j]):
+            usual_a = usual_b = max(usual_a, usual_b)
+        return a >= _LIKE * usual_a and b >= _LIKE * usual_b
     union = _union(box[i], box[j])
     filled = area[i] > _LIKE_FILL * a and area[j] > _LIKE_FILL * b
     return filled and min(a, b) >= _LIKE_BOX * union and a + b < _APART * union
@@ -212,7 +213,7 @@ def _share_inside(box: Floats, other: Floats) -> float:
 
 
 @inlined
-def _above_each_other(a: Floats, b: Floats) -> bool:
+def _share_columns(a: Floats, b: Floats) -> bool:
     """Whether two boxes have columns in common."""
     return a[0] < b[0] + b[2] and b[0] < a[0] + a[2]
 
