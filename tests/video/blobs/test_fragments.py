@@ -12,7 +12,7 @@ from vidtrack.video.blobs.fragments import links, together
 from vidtrack.video.blobs.nearest import nearest_box
 from vidtrack.video.blobs.regions import Regions, find_regions
 
-CAR = (40.0, 20.0)
+CAR, FAR_CAR = (40.0, 20.0), (16.0, 10.0)
 NOBODY = np.empty((0, 4))
 
 
@@ -50,14 +50,12 @@ def test_two_regions_that_are_each_like_a_vehicle_are_two_whoever_was_predicted(
     assert grouped([[10, 10, 35, 18], [30, 30, 35, 18]], [[8, 8, 60, 42]], typical, gap=0.5) == [0, 1]
 
 
-FAR_CAR = (16.0, 10.0)
-
-
 def either_order(boxes, typical):
     """Groups of two boxes inside one predicted vehicle, which do not depend on their order."""
-    within, ahead = [[8, 5, 60, 60]], grouped(boxes, [[8, 5, 60, 60]], typical, gap=0.5)
-    assert ahead == grouped(boxes[::-1], within, typical[::-1], gap=0.5)
-    return ahead
+    within = [[8, 5, 60, 60]]
+    group = grouped(boxes, within, typical, gap=0.5)
+    assert grouped(boxes[::-1], within, typical[::-1], gap=0.5) == group
+    return group
 
 
 @pytest.mark.parametrize("left", [50, 52])
