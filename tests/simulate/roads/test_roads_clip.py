@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import cv2
 import numpy as np
 import pytest
 
@@ -168,3 +169,15 @@ def test_an_unknown_road_and_a_camera_that_sees_too_little_are_refused():
         simulate_road("roundabuot")
     with pytest.raises(ConfigError, match="camera_height"):
         simulate_road("roundabout", tilt_deg=80, camera_height=5)
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1920, 1080)])
+def test_beams_at_dusk_are_as_soft_in_a_larger_picture(size):
+    small, large = (
+        simulate_road("junction-3d", seed=3, size=of, seconds=4, light="dusk", noise=0.0).frame(50)
+        for of in ((640, 360), size)
+    )
+    reduced = cv2.resize(large, (640, 360), interpolation=cv2.INTER_AREA)
+    difference = np.abs(cv2.blur(reduced, (9, 9)).astype(int) - cv2.blur(small, (9, 9)))
+    assert difference.mean() < 1
+    assert difference.max() < 25

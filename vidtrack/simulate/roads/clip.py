@@ -38,6 +38,7 @@ START = datetime.fromisoformat("2026-06-01T07:00:00+02:00")
 SIZE, FPS, SECONDS, HEIGHT_M = (1280, 720), 25.0, 60.0, 8.0
 VIEW = np.radians(60)
 LEAST_POINTS = 4  # on the road that the camera must show, to calibrate it
+ROUGH_ROWS = 360  # rows of a picture in which a wet road blurs by 3 x 9 px
 AIR_PX = 512.0  # width of a picture in which rain and snow have the size of the flat scenarios
 MIRRORED, MIRROR_LIGHT = 0.3, 0.7  # share of a wet road's light that is mirrored, and what that loses
 
@@ -142,7 +143,8 @@ class RoadClip(Frames):
             colour = MIRROR_LIGHT * actor.solid.colours[~actor.solid.glows].mean(axis=0)
             for polygon in actor.mirrored(view):
                 cv2.fillConvexPoly(mirrored, np.rint(polygon - 0.5).astype(np.int32), colour.tolist())
-        mirrored = np.asarray(cv2.blur(mirrored, (3, 9)))
+        rough = self.size[1] / ROUGH_ROWS
+        mirrored = np.asarray(cv2.blur(mirrored, (max(1, round(3 * rough)), max(1, round(9 * rough)))))
         cv2.addWeighted(picture, 1 - MIRRORED, mirrored, MIRRORED, 0, dst=picture)
 
     @cached_property

@@ -12,7 +12,7 @@ from vidtrack.simulate.moment import Canvas, pixel_centres, rounded
 from vidtrack.simulate.roads.pinhole import NEAR_M, Pinhole
 from vidtrack.simulate.roads.stage import Actor, fill
 
-COARSE = 4  # px; beams are soft and are drawn on a coarser grid
+COARSE_ROWS = 90  # beams are soft and are drawn on a coarser grid of about so many rows
 REACHES_M = (5.0, 9.0, 15.0, 24.0)
 BEAM_LIGHT = 0.8
 POOL_M = 7.0
@@ -31,14 +31,15 @@ def lit(
 ) -> Canvas:
     """The picture by the sky's remaining light and by lamps; `actors` from the farthest to the nearest."""
     height, width = picture.shape[:2]
-    beams = np.zeros((height // COARSE + 1, width // COARSE + 1), np.uint8)
+    coarse = max(1, round(height / COARSE_ROWS))  # px
+    beams = np.zeros((height // coarse + 1, width // coarse + 1), np.uint8)
     glow = np.zeros(picture.shape, np.float32)
     for actor in actors:
-        _add_beams(beams, actor, camera)
+        _add_beams(beams, actor, camera, coarse)
         for polygon in actor.silhouette:
             cv2.fillConvexPoly(glow, np.rint(polygon - 0.5).astype(np.int32), (0.0, 0.0, 0.0))
         _add_lamps(glow, actor, camera, wet)
-    wide = cv2.resize(cv2.blur(beams, (5, 5)), (beams.shape[1] * COARSE, beams.shape[0] * COARSE))
+    wide = cv2.resize(cv2.blur(beams, (5, 5)), (beams.shape[1] * coarse, beams.shape[0] * coarse))
     shining = (BEAM_LIGHT / 255 * wide[:height, :width, None]) * BEAM
     shining += AMBIENT[light] * np.array([1.15, 1.0, 0.9], np.float32)
     if pools is not None:
@@ -46,7 +47,7 @@ def lit(
     return rounded(picture * shining + glow)
 
 
-def _add_beams(beams: Canvas, actor: Actor, camera: Pinhole) -> None:
+def _add_beams(beams: Canvas, actor: Actor, camera: Pinhole, coarse: int) -> None:
     """Light on the road ahead, less with the distance."""
     front = float(actor.solid.headlamps[0, 0])
     half = float(np.abs(actor.solid.headlamps[:, 1]).max())
@@ -56,7 +57,7 @@ def _add_beams(beams: Canvas, actor: Actor, camera: Pinhole) -> None:
         body = np.array([(front, -half, 0), (front + reach, -far, 0), (front + reach, far, 0), (front, half, 0)])
         xy, depth = camera.project(body @ actor.turn + actor.place)
         if depth.min() > NEAR_M:
-            fill(step, xy / COARSE, 255 * (1 - reach / (REACHES_M[-1] + 8)))
+            fill(step, xy / coarse, 255 * (1 - reach / (REACHES_M[-1] + 8)))
     np.maximum(beams, step, out=beams)
 
 
