@@ -25,7 +25,7 @@ class SourceSettings(Group):
     fps: float | None = Field(None, gt=0, le=1000)
     """frames/s if the input has no times or wrong ones; None: from the video or seqinfo.ini, else 25"""
     scale: float | None = Field(None, gt=0, le=1)
-    """processed over source size, rounded to 1, 1/2, 1/3, ...; None: the largest of these with at most 580 rows"""
+    """processed over source size, rounded to 1, 1/2, 1/3, ...; None: the largest of these with at most 500 rows"""
     mask: Path | None = None
     """picture whose white part is tracked; None: everything"""
     decoder: Decoder = "software"

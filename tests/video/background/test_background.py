@@ -294,11 +294,12 @@ def test_nothing_is_foreground_where_the_keep_picture_is_black():
 
 
 @pytest.mark.parametrize(
-    ("rows", "step"), [(120, 1), (240, 1), (576, 1), (580, 1), (720, 2), (1080, 2), (1440, 3), (2160, 4)]
+    ("rows", "step"),
+    [(120, 1), (240, 1), (480, 1), (500, 1), (540, 2), (576, 2), (720, 2), (1080, 3), (1440, 3), (2160, 5)],
 )
-def test_large_pictures_are_reduced_to_at_most_580_rows(rows, step):
+def test_large_pictures_are_reduced_to_at_most_500_rows(rows, step):
     assert reduction(rows, None) == step
-    assert rows / step <= 580
+    assert rows / step <= 500
 
 
 @pytest.mark.parametrize("kind", get_args(Detector))

@@ -17,7 +17,7 @@ from vidtrack.video.background.filters import LARGEST_STEP, area_average, smooth
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
 
-FULL_SIZE_ROWS = 580  # taller pictures are reduced to at most this many rows
+FULL_SIZE_ROWS = 500  # taller pictures are reduced to at most this many rows
 _FAINT = 2.0  # grey levels of chroma that a codec adds to a picture without colour
 _SPOTS = 0.01  # share of a picture without colour that has some: captions
 _VIDEO_BLACK = 16  # luminance of black where it does not span the full range
@@ -136,7 +136,7 @@ class View:
 
 
 def reduction(rows: int, scale: float | None) -> int:
-    """Source pixels per processed pixel: 1/scale rounded, or the smallest factor for at most 580 rows."""
+    """Source pixels per processed pixel: 1/scale rounded, or the smallest factor for at most 500 rows."""
     if scale is not None:
         return max(1, round(1 / scale))
     return max(1, math.ceil(rows / FULL_SIZE_ROWS))
