@@ -22,7 +22,7 @@ from vidtrack.video.span import ROUNDING_S, Span
 from vidtrack.video.stats import SourceStats
 
 _DEPTH = 4  # frames read ahead: enough to even out key frames, 50 MB at 4K
-_KEPT_BYTES = 200_000_000  # of an opening; ten seconds of 960x540 at 25 frames/s are 194 MB
+_KEPT_BYTES = 200_000_000  # of an opening; ten seconds of 640x360 at 25 frames/s are 86 MB
 
 
 def open_source(path: str, settings: SourceSettings) -> Source:
