@@ -92,8 +92,9 @@ def test_track_prints_the_folder_and_nothing_else(vidtrack, tmp_path):
 
 def test_options_stand_for_settings(vidtrack, tmp_path):
     options = ("--method", "nn", "--distance", "euclidean", "--detector", "paper", "--set", "tracker.coast_s=2")
-    code, _, _ = vidtrack("track", CROSSING, "-o", "out", "--end", 0.5, *options)
+    code, _, _ = vidtrack("track", CROSSING, "-o", "out", "--end", 0.5, "--max-fps", 5, *options)
     assert code == 0
+    assert check_results(tmp_path / "out")["frames_read"] == 3
     found = json.loads((tmp_path / "out" / "summary.json").read_text())["settings"]
     assert (found["tracker"]["method"], found["tracker"]["distance"]) == ("nn", "euclidean")
     assert found["detector"]["kind"] == "paper"

@@ -1,15 +1,16 @@
 """Where the processor's time of one frame goes, beside decoding and beside MOG2 with components.
 
-    python tools/benchmark_frame.py CLIP ... [--rounds 3]
+    python tools/benchmark_frame.py CLIP ... [--rounds 3] [--set KEY=VALUE ...]
     python tools/benchmark_frame.py CLIP ... --over detector.disturbance.registration=false
 
 Each round runs on each clip, one after the other: decoding alone; a whole run into a folder, as `vidtrack track CLIP`
 makes it; the same stages without results, each on a clock of its own; and OpenCV's MOG2 with connected components, in
 one thread, on the same pictures. All times are processor time in ms a frame, user and system, of all threads for
 decoding, run and MOG2, and of the main thread for the stages: other processes on the machine do not count, apart from
-the caches that they share. Medians of the rounds. `beyond` is the run less decoding, `ratio` the duration of the run,
-with all cores, over that of decoding in one thread; other processes count there. `over` is the time of the detector
-over that with the settings of `--over`, of the same round.
+the caches that they share. Medians of the rounds. With --set source.max_fps=N a frame is a picture of the file, looked
+at or not. `beyond` is the run less decoding, `ratio` the duration of the run, with all cores, over that of decoding in
+one thread; other processes count there. `over` is the time of the detector over that with the settings of `--over`, of
+the same round.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from resource import RUSAGE_SELF, getrusage
 from statistics import median
@@ -52,9 +54,9 @@ def decode(path: Path, threads: int = 0) -> int:
         return sum(1 for _ in container.decode(video=0))
 
 
-def whole_run(path: Path) -> None:
+def whole_run(path: Path, settings: Settings) -> None:
     """A run into a folder."""
-    with tempfile.TemporaryDirectory() as place, run_file(str(path), Settings(), Path(place) / "run") as run:
+    with tempfile.TemporaryDirectory() as place, run_file(str(path), settings, Path(place) / "run") as run:
         for _ in run:
             pass
 
@@ -98,10 +100,10 @@ def cost(what: Callable[[Path], object], path: Path) -> float:
     return used() - begin
 
 
-def ratio(path: Path) -> float:
+def ratio(path: Path, settings: Settings) -> float:
     """Duration of a run over that of decoding in one thread."""
     begin = perf_counter()
-    whole_run(path)
+    whole_run(path, settings)
     middle = perf_counter()
     decode(path, threads=1)
     return (middle - begin) / (perf_counter() - middle)
@@ -112,21 +114,26 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("clips", type=Path, nargs="+", metavar="CLIP")
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--set", dest="assignments", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--over", default="", metavar="SETTINGS", help="separated by semicolons; adds `over`")
     options = parser.parse_args()
+    settings = load(assignments=options.assignments)
     other = load(assignments=options.over.split(";")) if options.over else None
     found: dict[Path, list[dict[str, float]]] = {clip: [] for clip in options.clips}
     sizes: dict[Path, tuple[int, int]] = {}
     cv2.setNumThreads(1)
-    whole_run(options.clips[0])  # compiles, and imports what is imported late
+    whole_run(options.clips[0], settings)  # compiles, and imports what is imported late
     for _ in range(options.rounds):
         for clip, rows in found.items():
             frames = decode(clip)
-            with open_source(str(clip), Settings().source) as source:
+            with open_source(str(clip), settings.source) as source:
                 sizes[clip] = source.width, source.height
-            row = {"decode": cost(decode, clip), "run": cost(whole_run, clip), "MOG2": cost(mog2, clip)}
-            row |= stages(clip, Settings())
-            rows.append({name: 1e3 * seconds / frames for name, seconds in row.items()} | {"ratio": ratio(clip)})
+            run = partial(whole_run, settings=settings)
+            row = {"decode": cost(decode, clip), "run": cost(run, clip), "MOG2": cost(mog2, clip)}
+            row |= stages(clip, settings)
+            rows.append(
+                {name: 1e3 * seconds / frames for name, seconds in row.items()} | {"ratio": ratio(clip, settings)}
+            )
             if other is not None:
                 rows[-1]["over"] = row["detect"] / stages(clip, other)["detect"]
     names = ["decode", "run", *STAGES, "MOG2", "beyond", "ratio", *(["over"] if other is not None else [])]

@@ -1,15 +1,16 @@
 """How many cameras one core watches, and how late their tracks are.
 
     python tools/benchmark_live.py CLIP ... [--fps 10 25] [--cameras 1 2 4] [--seconds 20] [--core 0]
+        [--set KEY=VALUE ...]
 
 Each clip becomes an H.264 stream without B-frames, as cameras send it, in MPEG-TS over HTTP, round and round in real
 time. It is watched by so many live runs at once, each a process of its own, as `vidtrack live` starts them, all on one
 core; what sends the stream is on the others. Nothing counts until 15 s after the first tracks of the last camera:
 kernels are loaded until then.
 
-A row for each clip, rate and number of cameras: the mean number of vehicles, processor time per camera and frame (user
-and system, all threads, with decoding), the share of the core that they need, frames that were dropped, and the time
-from a picture's arrival to its tracks: median, and the 99th percentile of the worst camera. `a core` is how many
+A row for each clip, rate and number of cameras: the mean number of vehicles, processor time per camera and picture sent
+(user and system, all threads, with decoding), the share of the core that they need, frames that were dropped, and the
+time from a picture's arrival to its tracks: median, and the 99th percentile of the worst camera. `a core` is how many
 cameras the processor time of one leaves room for. Latencies hold on a machine that does nothing else.
 """
 
@@ -34,6 +35,7 @@ from typing import NoReturn
 import av
 import numpy as np
 
+from vidtrack.config.load import load
 from vidtrack.config.settings import Settings
 from vidtrack.run.live.leave import run_and_leave
 from vidtrack.run.live.run import LiveRun
@@ -112,16 +114,16 @@ def send(pictures: list[bytes], size: tuple[int, int], fps: int, told: Connectio
     server.serve_forever()
 
 
-def watch(address: str, seconds: float, starting: Semaphore, told: Connection) -> NoReturn:
+def watch(address: str, settings: Settings, seconds: float, starting: Semaphore, told: Connection) -> NoReturn:
     """The process of a live run, which takes one of the cameras that start; tells what it needed."""
-    run_and_leave(lambda: told.send(_watched(address, seconds, starting)))
+    run_and_leave(lambda: told.send(_watched(address, settings, seconds, starting)))
 
 
-def _watched(address: str, seconds: float, starting: Semaphore) -> Watched:
+def _watched(address: str, settings: Settings, seconds: float, starting: Semaphore) -> Watched:
     vehicles, latencies, since_s = [], [], math.inf
     with (
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,  # late results may still be written into it
-        LiveRun(address, Settings(), Path(folder) / "run") as run,
+        LiveRun(address, settings, Path(folder) / "run") as run,
     ):
         for number, step in enumerate(run):
             now_s = time.monotonic()
@@ -147,7 +149,7 @@ def _used() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-def measure(clip: Path, fps: int, cameras: int, seconds: float, core: int) -> list[Watched]:
+def measure(clip: Path, settings: Settings, fps: int, cameras: int, seconds: float, core: int) -> list[Watched]:
     """So many cameras at once. Raises EOFError if one of the runs fails."""
     context = get_context("spawn")
     with av.open(str(clip)) as film:
@@ -158,7 +160,7 @@ def measure(clip: Path, fps: int, cameras: int, seconds: float, core: int) -> li
     address = f"http://127.0.0.1:{here.recv()}/"
     pipes = [context.Pipe() for _ in range(cameras)]
     starting = context.Semaphore(cameras)
-    runs = [context.Process(target=watch, args=(address, seconds, starting, told)) for _, told in pipes]
+    runs = [context.Process(target=watch, args=(address, settings, seconds, starting, told)) for _, told in pipes]
     every_core = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {core})  # inherited by what starts now, with all its threads
     for run in runs:
@@ -181,19 +183,21 @@ def main() -> None:
     parser.add_argument("--cameras", type=int, nargs="+", default=[1, 2, 4])
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--core", type=int, default=0)
+    parser.add_argument("--set", dest="assignments", action="append", default=[], metavar="KEY=VALUE")
     options = parser.parse_args()
+    settings = load(assignments=options.assignments)
     print("clip             fps  cameras  vehicles  ms/frame  a core   load  dropped    p50    p99 ms")
     for clip in options.clips:
         for fps in options.fps:
             for cameras in options.cameras:
-                found = measure(clip, fps, cameras, options.seconds, options.core)
-                ms = 1e3 * float(np.mean([each.used_s / each.frames for each in found]))
-                load = sum(each.used_s / each.seconds for each in found)
+                found = measure(clip, settings, fps, cameras, options.seconds, options.core)
+                of_core = sum(each.used_s / each.seconds for each in found)
+                ms = 1e3 * of_core / cameras / fps
                 vehicles = float(np.mean([each.vehicles for each in found]))
                 middle, late = np.median([each.median_ms for each in found]), max(each.late_ms for each in found)
                 print(
                     f"{clip.stem[:16]:16s} {fps:3d} {cameras:8d} {vehicles:9.1f} {ms:9.2f} {1e3 / (ms * fps):7.1f}"
-                    f" {load:6.0%} {sum(each.dropped for each in found):8d} {middle:6.0f} {late:6.0f}",
+                    f" {of_core:6.0%} {sum(each.dropped for each in found):8d} {middle:6.0f} {late:6.0f}",
                     flush=True,
                 )
 

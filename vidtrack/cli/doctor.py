@@ -29,6 +29,7 @@ class DoctorOptions(WithSettings):
     scale: float | None
     mask: Path | None
     fps: float | None
+    max_fps: float | None
     start: float | None
     json_to: str | None
 
@@ -48,6 +49,7 @@ Examples:
 @click.option("--scale", type=float, metavar="F", help="As for track: detect in a reduced picture.")
 @click.option("--mask", type=click.Path(path_type=Path), metavar="IMAGE", help="As for track: look where it is white.")
 @click.option("--fps", type=float, metavar="N", help="As for track: the true rate.")
+@click.option("--max-fps", type=float, metavar="N", help="As for track: look at no more pictures a second.")
 @click.option("--start", type=float, metavar="S", help="Begin at this time [s].")
 @json_option
 @common("Folder for doctor.json.  [default: only printed]")

@@ -32,6 +32,7 @@ SETTING = {
     "scale": "source.scale",
     "mask": "source.mask",
     "fps": "source.fps",
+    "max_fps": "source.max_fps",
     "decoder": "source.decoder",
     "skip_bad_rows": "radar.skip_bad_rows",
     "radar_position": "radar.geodetic",

@@ -56,9 +56,9 @@ def command(options: TrackOptions) -> None:
 
     start_log(options.verbose, options.quiet)
     source = options.source
-    base = recorded_settings(source) if is_recording(source) else None
-    stored = is_detections(source)
-    settings = options.settings(Input.DETECTIONS if stored else Input.VIDEO, base)
+    stored, recorded = is_detections(source), is_recording(source)
+    kind = Input.DETECTIONS if stored else Input.RECORDING if recorded else Input.VIDEO
+    settings = options.settings(kind, recorded_settings(source) if recorded else None)
     announce_compiling(options.quiet, video=not stored)
     if stored:
         rehearse_beside(first_boxes, source, settings)

@@ -40,6 +40,7 @@ class PictureOptions(TrackingOptions):
     site: Path | None
     start: float | None
     end: float | None
+    max_fps: float | None
     scale: float | None
     mask: Path | None
     decoder: str | None
@@ -116,6 +117,7 @@ _OPTIONS = (
     ),
     click.option("--start", type=float, metavar="S", help="Begin at this time [s]."),
     click.option("--end", type=float, metavar="S", help="Stop at this time [s]."),
+    click.option("--max-fps", type=float, metavar="N", help="Look at no more than N pictures a second."),
     click.option("--scale", type=float, metavar="F", help="Detect in a reduced picture: 0.5, 0.333, ..."),
     click.option("--mask", type=click.Path(path_type=Path), metavar="IMAGE", help="Only where this picture is white."),
     click.option(

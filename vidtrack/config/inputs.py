@@ -13,6 +13,7 @@ class Input(StrEnum):
     """Kinds of input; the values are their names in messages."""
 
     VIDEO = "a video"
+    RECORDING = "a recording of a live run"
     CAMERA = "a camera"
     DETECTIONS = "stored detections"
     RADAR = "radar plots"
@@ -20,6 +21,7 @@ class Input(StrEnum):
 
 _OWN = {
     Input.VIDEO: ("detector", "blobs"),
+    Input.RECORDING: ("detector", "blobs"),
     Input.CAMERA: ("detector", "blobs", "live", "events"),
     Input.DETECTIONS: ("detections",),
     Input.RADAR: ("radar",),
@@ -30,10 +32,16 @@ _OF_PICTURES = (
     *("tracker.box_s", "tracker.confirm_s", "tracker.confirm_travel", "tracker.detection_probability"),
     *("tracker.idle_s", "tracker.idle_travel", "tracker.restless", "tracker.look", "tracker.relieve"),
     *("tracker.blob_overlap", "tracker.merged_blobs", "tracker.group_cover", "tracker.hidden_s", "tracker.parts"),
-    *("source.scale", "source.mask", "source.decoder", "output.video_crf", "output.jpeg_quality"),
+    *("source.max_fps", "source.scale", "source.mask", "source.decoder", "output.video_crf", "output.jpeg_quality"),
 )
+_OF_OTHER_INPUT = ("detections", "radar", "live", "events", "tracker.redundant")
 _UNREAD = {
-    Input.VIDEO: ("detections", "radar", "live", "events", "tracker.redundant"),
+    Input.VIDEO: _OF_OTHER_INPUT,
+    Input.RECORDING: (
+        *_OF_OTHER_INPUT,
+        *(f"source.{name}" for name in ("start_s", "end_s", "fps", "max_fps", "decoder")),
+        *("detector.disturbance.preview_s", "detector.disturbance.patches"),
+    ),
     Input.CAMERA: (
         *("detections", "radar", "tracker.redundant"),
         *("detector.disturbance.preview_s", "detector.disturbance.patches"),

@@ -24,6 +24,7 @@ _MISSING, _REPEATED = 0.02, 0.05  # shares of the pictures
 _SLOW = 5.0  # pictures/s
 _WEAK = 0.7  # of the rate that the camera states
 _RESERVE = 0.8  # of the machine
+_ENOUGH = 10.0  # pictures/s at which of 96 crossings 94 are counted still
 # pictures
 _THRESHOLD = "detector.disturbance.luma_threshold"
 _DIM, _BLACK = 100.0, 25.0  # 95th percentile of the grey level
@@ -77,7 +78,7 @@ def on_time(findings: Findings, settings: Settings) -> Iterator[Advice]:
     """Advice on time."""
     yield from _on_reception(findings)
     if findings.timing is not None:
-        yield from _on_rate(findings, findings.timing)
+        yield from _on_rate(findings, findings.timing, settings)
         yield from _on_gaps(findings.timing, settings)
     if findings.speed is not None:
         yield from _on_speed(findings, findings.speed, settings)
@@ -102,12 +103,13 @@ def _on_reception(findings: Findings) -> Iterator[Advice]:
         yield Advice("decoding", True, f"{text}: let the camera send a smaller picture, or fewer of them")
 
 
-def _on_rate(findings: Findings, timing: Timing) -> Iterator[Advice]:
+def _on_rate(findings: Findings, timing: Timing, settings: Settings) -> Iterator[Advice]:
     header = findings.reception.header_fps
     if header is not None and abs(header / findings.fps - 1) > _DISAGREEMENT:
         text = f"the header says {header:g} frames/s, the pictures' times {findings.fps:.4g}; the times are used"
         yield Advice("header", False, f"{text}, --fps overrules both")
-    if findings.kind == "live" and timing.rate * (1 - timing.missing_share) < _WEAK * findings.fps:
+    promised = min(findings.fps, settings.source.max_fps or math.inf)
+    if findings.kind == "live" and timing.rate * (1 - timing.missing_share) < _WEAK * promised:
         text = f"the camera promises {findings.fps:.3g} frames/s and gives {timing.rate:.3g}"
         yield Advice("promise", True, f"{text}: long exposure in the dark, or a weak network")
     if timing.rate < _SLOW:
@@ -145,6 +147,10 @@ def _on_speed(findings: Findings, speed: Speed, settings: Settings) -> Iterator[
     left_s = _RESERVE / needed - (speed.decode_s or 0.0)
     if left_s <= 0:
         yield Advice("speed", True, f"{text}; decoding alone is too slow: a smaller picture or a simpler codec")
+        return
+    fps = math.floor((_RESERVE - needed * (speed.decode_s or 0.0)) / speed.track_s)
+    if fps >= _ENOUGH:
+        yield Advice("speed", True, text, (f"--max-fps {fps}",))
         return
     step = math.ceil(reduction(findings.height, settings.source.scale) * math.sqrt(speed.track_s / left_s))
     yield Advice("speed", True, text, (scale_option(step),))

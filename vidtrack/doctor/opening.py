@@ -33,7 +33,8 @@ def open_pictures(source: str, settings: Settings) -> Source | LiveSource | Reco
     """A source of frames. Raises SourceError if it cannot be opened."""
     if is_live(source):
         address = parse_address(source, settings.live.timeout_s)
-        return LiveSource(address, settings.live, connect=connection_to(address, settings))
+        connect = connection_to(address, settings)
+        return LiveSource(address, settings.live, max_fps=settings.source.max_fps, connect=connect)
     if is_recording(source):
         return Recording(source)
     return open_source(source, settings.source)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -72,7 +73,8 @@ class Subject:
     def summary(self, folder: Path, counts: Callable[[], Mapping[str, Mapping[str, int]]] | None = None) -> Summary:
         """Opens summary.json in a folder, with these counts instead of those of the whole run."""
         path, counts = folder / "summary.json", counts or (self.counter.totals if self.counter else None)
-        return Summary(path, self.source, self.settings, self.reading, counts, usual_s=1 / self.fps)
+        usual_s = 1 / min(self.fps, self.settings.source.max_fps or inf)
+        return Summary(path, self.source, self.settings, self.reading, counts, usual_s=usual_s)
 
 
 class FileSource(Protocol):

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from itertools import chain
+from math import inf
 from pathlib import Path
 from types import TracebackType
 
@@ -15,6 +16,7 @@ from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.container import VideoFile
 from vidtrack.video.frame import Frame
+from vidtrack.video.max_rate import MaxRate
 from vidtrack.video.pictures import ImageSequence, images_in, images_like
 from vidtrack.video.planes import matched, to_frame
 from vidtrack.video.readahead import ReadAhead
@@ -87,6 +89,8 @@ class Excerpts:
 class Source:
     """The frames of an input from `start_s` to `end_s`, read in a thread of their own; iterate once.
 
+    Of more than `max_fps` pictures a second those between have numbers and times, and do not come.
+
     name           default name of the run
     place          the file, or the folder of the images
     width, height  of the first picture [px]; later ones of another size are scaled to it
@@ -105,16 +109,19 @@ class Source:
         self.place = pictures.place
         self.fps = pictures.fps
         self.stats = stats
-        frames = (to_frame(*picture) for picture in pictures)
-        first = next(frames, None)
-        if first is None:
+        decoded = iter(pictures)
+        begin = next(decoded, None)
+        if begin is None:
             pictures.close()
             raise SourceError(f"no picture of {pictures.name} can be decoded")
-        self._first = first
+        self._first = first = to_frame(*begin)
         self.height, self.width = first.shape
-        self.frames = None if pictures.frames is None else len(self._span.frames(self.fps, pictures.frames))
+        self._looked_at_fps = min(self.fps, settings.max_fps or inf)
+        self.frames = None if pictures.frames is None else self._expected(pictures.frames)
         self._reduce: Callable[[Frame], Frame] = lambda frame: frame
-        self._ahead = ReadAhead(self._reduced(self._alike(self._in_span(chain([first], frames)), first)), _DEPTH)
+        rate = MaxRate(settings.max_fps, since_s=0.0, after_s=first.time_s - 1 / self.fps if from_s else -inf)
+        frames = (to_frame(*picture) for picture in chain([begin], decoded) if rate.chooses(picture[1]))
+        self._ahead = ReadAhead(self._reduced(self._alike(self._in_span(frames), first)), _DEPTH)
         self._opened: deque[Frame] = deque()  # frames of the opening, kept for the reading
 
     def __iter__(self) -> Source:
@@ -149,7 +156,7 @@ class Source:
         """
         begin_s = self._span.start_s
         end_s = begin_s + seconds if end_s is None else min(end_s, begin_s + seconds)
-        size = (end_s - begin_s) * self.fps * self._reduce(self._first).nbytes
+        size = (end_s - begin_s) * self._looked_at_fps * self._reduce(self._first).nbytes
         if end_s <= self._span.end_s and size <= _KEPT_BYTES:
             yield from self._kept(end_s)
             return
@@ -180,6 +187,10 @@ class Source:
         self._opened.clear()
         self._ahead.close()
         self._pictures.close()
+
+    def _expected(self, pictures: int) -> int:
+        """How many frames come of so many pictures in the input."""
+        return round(len(self._span.frames(self.fps, pictures)) * self._looked_at_fps / self.fps)
 
     def _in_span(self, frames: Iterator[Frame]) -> Iterator[Frame]:
         empty = True

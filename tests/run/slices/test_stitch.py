@@ -30,14 +30,14 @@ def finish(run):
             pass
 
 
-def stitched(folder, found):
+def stitched(folder, found, settings=SETTINGS):
     """The run of these slices, in `folder`."""
     parts = [folder / str(one.number) for one in found]
     for one, part in zip(found, parts, strict=True):
         part.mkdir(parents=True)
         before = parts[one.number - 1] if one.goes_on else None
-        track_slice(VIDEO, SETTINGS, one, part, before, lambda: None)
-    finish(Run(stitched_pipeline(VIDEO, found, parts, SETTINGS), folder / "whole"))
+        track_slice(VIDEO, settings, one, part, before, lambda: None)
+    finish(Run(stitched_pipeline(VIDEO, found, parts, settings), folder / "whole"))
     return folder / "whole"
 
 
@@ -53,9 +53,13 @@ def halves(tmp_path_factory):
     return stitched(tmp_path_factory.mktemp("halves"), cuts(0.0, None, 10.0, 5.0, 4.0))
 
 
-def test_slices_that_go_on_from_each_other_are_the_single_run_bit_by_bit(single, tmp_path):
+@pytest.mark.parametrize("max_fps", [None, 7.0])
+def test_slices_that_go_on_from_each_other_are_the_single_run_bit_by_bit(max_fps, tmp_path):
     """The second begins in the middle of a crossing; the last one lies beyond the end of the file."""
-    whole = stitched(tmp_path, cuts(0.0, None, 12.0, 4.0, None))
+    settings = load(assignments=[("source.max_fps", max_fps)], base=SETTINGS.model_dump())
+    single = tmp_path / "single"
+    finish(run_file(VIDEO, settings, single))
+    whole = stitched(tmp_path, cuts(0.0, None, 12.0, 4.0, None), settings)
     files = {path.name for path in single.iterdir()} - {"summary.json", "tracks.parquet"}
     assert {path.name for path in whole.iterdir()} == {path.name for path in single.iterdir()}
     assert set(filecmp.cmpfiles(single, whole, files, shallow=False)[0]) == files

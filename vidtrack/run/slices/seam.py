@@ -41,9 +41,13 @@ class Seam:
 _NOBODY = np.empty(0, np.int64)
 
 
-def handed_on(last: Step, first: Step) -> Seam:
-    """The seam before the first step of a slice that goes on from the state after the last step of another one."""
-    return Seam(first.time_s, last.index + 1 - first.index, None, _NOBODY, _NOBODY, same_ids=True)
+def handed_on(last: Step, first: Step, fps: float | None) -> Seam:
+    """The seam before the first step of a slice that goes on from the state after the last step of another one.
+
+    fps  nominal frames/s if there are pictures between the two, at which nobody looked; None: there are none
+    """
+    passed = 1 if fps is None else round((first.time_s - last.time_s) * fps)
+    return Seam(first.time_s, last.index + passed - first.index, None, _NOBODY, _NOBODY, same_ids=True)
 
 
 def seam(left: Sequence[Step], right: Sequence[Step], begin_s: float, fps: float) -> Seam:

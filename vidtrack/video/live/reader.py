@@ -22,6 +22,7 @@ from vidtrack.video.live.connection import Connection, Refused, Stalled
 from vidtrack.video.live.mailbox import Mailbox
 from vidtrack.video.live.packet_sink import PacketSink, Place
 from vidtrack.video.live.stats import LiveStats
+from vidtrack.video.max_rate import MaxRate
 from vidtrack.video.planes import to_frame
 
 log = logging.getLogger(__name__)
@@ -50,6 +51,7 @@ class Reader:
 
     connect  opens a Connection
     shots    queue for pictures; closed with an error if the source cannot be opened at the start
+    max_fps  pictures between so many a second are decoded and not delivered; None: all are delivered
     alive_s  monotonic time of the thread's last activity
     """
 
@@ -61,6 +63,7 @@ class Reader:
         settings: LiveSettings,
         recorder: PacketSink,
         clock: CaptureClock,
+        max_fps: float | None,
     ) -> None:
         self._connect = connect
         self._shots = shots
@@ -69,6 +72,8 @@ class Reader:
         self._backoff = Backoff(settings.backoff_s, settings.backoff_longest_s, Random())
         self._recorder = recorder
         self._clock = clock
+        self._max_fps = max_fps
+        self._rate = MaxRate(max_fps)
         self._stopping = Event()
         self._failures = 0  # since the last picture
         self._reason = ""  # of the last failure
@@ -125,6 +130,7 @@ class Reader:
         try:
             self._connections += 1
             self._clock.reconnected()
+            self._rate = MaxRate(self._max_fps)
             self._read_packets(connection)
         finally:
             self._recorder.end_part()
@@ -176,6 +182,8 @@ class Reader:
             self._report_stream(connection, picture)
             time_s = self._clock.time_s(connection.stamp_s(picture), now_s)
             self._stats.arrived(now_s)
+            if not self._rate.chooses(time_s):
+                continue
             place: Any = picture.opaque or self._recorder.place()
             shot = Shot(to_frame(0, time_s, picture), connection.fps, place)
             if not self._stopping.is_set():

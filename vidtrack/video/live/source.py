@@ -40,6 +40,7 @@ class LiveSource:
 
     settings   of the capture
     recorder   receives the packets; None: no recording
+    max_fps    of more pictures a second than this those between are not delivered; None: all are
     first      number of the first frame
     origin_s   None: the first picture has time 0
     like       all frames are converted to its size and kind; None: those of the first frame
@@ -56,6 +57,7 @@ class LiveSource:
         settings: LiveSettings,
         recorder: PacketSink | None = None,
         *,
+        max_fps: float | None = None,
         first: int = 0,
         origin_s: float | None = None,
         like: Frame | None = None,
@@ -64,6 +66,7 @@ class LiveSource:
     ) -> None:
         self._address = address
         self._settings = settings
+        self._max_fps = max_fps
         self._connect = connect or (lambda: Connection(address, settings.timeout_s, settings.ffmpeg))
         self._recorder = recorder or NoPacketSink()
         self._shots: Mailbox[Shot] = Mailbox(_EVERY if settings.every_frame else _NEWEST, waits=settings.every_frame)
@@ -125,7 +128,8 @@ class LiveSource:
         self._reader.stop(_END_S)
 
     def _read_on(self) -> Reader:
-        return Reader(self._connect, self._shots, self.stats, self._settings, self._recorder, self._clock)
+        reading = self.stats, self._settings, self._recorder, self._clock
+        return Reader(self._connect, self._shots, *reading, self._max_fps)
 
     def _first_shot(self) -> Shot:
         try:
