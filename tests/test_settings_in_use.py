@@ -132,6 +132,12 @@ def test_only_stored_detections_are_smoothed_by_default():
     assert "output.level" in refused(Input.DETECTIONS, "output.smooth=true", "output.level=counts")
 
 
+@pytest.mark.parametrize("setting", ["source.start_s=1", "source.max_fps=5", "detector.disturbance.preview_s=2"])
+def test_a_recording_is_of_the_pictures_that_were_tracked(setting):
+    assert "has no effect on a recording of a live run" in refused(Input.RECORDING, setting)
+    assert load(assignments=["tracker.coast_s=2", "output.smooth=true"], kind=Input.RECORDING)
+
+
 def test_a_resolution_cell_is_for_unresolved_targets_or_a_threshold():
     cell, off = "radar.cell_range_m=150", "radar.unresolved=false"
     said = "setting radar.cell_range_m has no effect here; it needs radar.unresolved=true or radar.snr_db=NUMBER"

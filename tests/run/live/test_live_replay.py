@@ -37,11 +37,11 @@ def replay(tape, folder, chosen):
     return (folder / "tracks.csv").read_text()
 
 
-@pytest.mark.parametrize("path", ["video.ts", "video.mjpg"])
-def test_a_recording_gives_the_same_tracks(camera, tmp_path, path):
+@pytest.mark.parametrize(("path", "max_fps"), [("video.ts", None), ("video.mjpg", None), ("video.ts", 15.0)])
+def test_a_recording_gives_the_same_tracks(camera, tmp_path, path, max_fps):
     site = tmp_path / "yard.toml"
     site.write_text(SITE)
-    chosen = settings("tracker.confirm_s=0.1", f"output.site={site}")
+    chosen = settings("tracker.confirm_s=0.1", f"output.site={site}", f"source.max_fps={max_fps}")
     extras = LiveExtras(record=tmp_path / "tape")
     with LiveRun(camera.url(path), chosen, tmp_path / "out", extras) as run:
 

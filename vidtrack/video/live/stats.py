@@ -16,7 +16,7 @@ _RATE_S = 10.0
 class LiveStats(SourceStats):
     """Counters and state of a camera.
 
-    received    pictures received, read or dropped
+    received    pictures received: read, dropped, or between those that were wanted
     reconnects  connections after the first
     stalls      time-outs of an open connection
     state       "connecting", "running", "waiting" (before another attempt) or "ended"
