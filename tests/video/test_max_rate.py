@@ -1,14 +1,17 @@
 """Of more pictures a second than are wanted, evenly spaced ones are chosen."""
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from source_clips import write_clip
+from source_clips import picture, write_clip
 
 from vidtrack.config.settings import SourceSettings
+from vidtrack.video.container import VideoFile
 from vidtrack.video.max_rate import MaxRate
 from vidtrack.video.source import open_part, open_source
+from vidtrack.video.stats import SourceStats
 
 
 def chosen(times, *arguments, **options):
@@ -53,12 +56,39 @@ def test_there_are_no_more_and_a_slow_source_loses_none(steps, most):
     assert np.isin(times[after_long], kept).all()
 
 
-def test_frames_of_a_file_keep_numbers_and_times(tmp_path):
-    path = write_clip(tmp_path / "clip.avi", 40)
+@pytest.mark.parametrize(
+    ("name", "codec", "pixels"),
+    [
+        ("clip.avi", "mpeg4", "yuv420p"),
+        ("clip.mp4", "libx264", "yuv420p"),
+        ("clip.avi", "mjpeg", "yuvj420p"),
+        ("clip.mkv", "mjpeg", "yuvj420p"),
+    ],
+)
+def test_frames_of_a_file_keep_numbers_and_times(tmp_path, name, codec, pixels):
+    path = write_clip(tmp_path / name, 40, codec, pixels)
     frames, source = read(path, max_fps=10)
     assert frames == [(k, k / 25) for k in (0, 2, 5, 7, 10, 12, 15, 17, 20, 22, 25, 27, 30, 32, 35, 37)]
     assert (source.fps, source.frames, source.stats.frames_read) == (25, 16, 16)
     assert read(path, max_fps=10, start_s=0.15, end_s=0.5)[0] == [(5, 0.2), (7, 0.28), (10, 0.4), (12, 0.48)]
+
+
+def test_only_what_is_looked_at_is_decoded_where_packets_are_pictures(tmp_path):
+    path = write_clip(tmp_path / "clip.avi", 40, "mjpeg", "yuvj420p")
+    all_of_it = {index: found for index, _, found in VideoFile(path, SourceSettings(), SourceStats())}
+    chosen = list(VideoFile(path, SourceSettings(max_fps=10), SourceStats()))
+    assert [index for index, *_ in chosen] == [0, 2, 5, 7, 10, 12, 15, 17, 20, 22, 25, 27, 30, 32, 35, 37]
+    for index, _, found in chosen:
+        np.testing.assert_array_equal(found.to_ndarray(), all_of_it[index].to_ndarray())
+
+
+def test_images_between_are_not_read(tmp_path):
+    for number in range(10):
+        cv2.imwrite(str(tmp_path / f"{number:03d}.png"), picture(number))
+    (tmp_path / "003.png").write_bytes(b"damaged")
+    frames, source = read(tmp_path, fps=25, max_fps=12.5)
+    assert [index for index, _ in frames] == [0, 2, 4, 6, 8]
+    assert source.stats.decode_errors == 0
 
 
 @pytest.mark.parametrize("start_s", [0.4, 0.44, 0.48, 0.8, 1.0])

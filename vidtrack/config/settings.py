@@ -25,13 +25,17 @@ class SourceSettings(Group):
     fps: float | None = Field(None, gt=0, le=1000)
     """frames/s if the input has no times or wrong ones; None: from the video or seqinfo.ini, else 25"""
     max_fps: float | None = Field(None, gt=0, le=1000)
-    """frames/s; of more pictures than this those between are decoded and not looked at; None: all are looked at"""
+    """frames/s; of more pictures than this those between are not looked at; None: all are looked at"""
     scale: float | None = Field(None, gt=0, le=1)
     """processed over source size, rounded to 1, 1/2, 1/3, ...; None: the largest of these with at most 500 rows"""
     mask: Path | None = None
     """picture whose white part is tracked; None: everything"""
     decoder: Decoder = "software"
     """hardware that decodes video (Linux: vaapi, nvdec; macOS: videotoolbox); auto: the first found, else software"""
+
+    def looked_at_fps(self, fps: float) -> float:
+        """Frames/s that are looked at of a source with `fps`."""
+        return fps if self.max_fps is None else min(fps, self.max_fps)
 
     @field_validator("end_s")
     @classmethod

@@ -108,7 +108,7 @@ def _on_rate(findings: Findings, timing: Timing, settings: Settings) -> Iterator
     if header is not None and abs(header / findings.fps - 1) > _DISAGREEMENT:
         text = f"the header says {header:g} frames/s, the pictures' times {findings.fps:.4g}; the times are used"
         yield Advice("header", False, f"{text}, --fps overrules both")
-    promised = min(findings.fps, settings.source.max_fps or math.inf)
+    promised = settings.source.looked_at_fps(findings.fps)
     if findings.kind == "live" and timing.rate * (1 - timing.missing_share) < _WEAK * promised:
         text = f"the camera promises {findings.fps:.3g} frames/s and gives {timing.rate:.3g}"
         yield Advice("promise", True, f"{text}: long exposure in the dark, or a weak network")

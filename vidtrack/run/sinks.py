@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -73,7 +72,7 @@ class Subject:
     def summary(self, folder: Path, counts: Callable[[], Mapping[str, Mapping[str, int]]] | None = None) -> Summary:
         """Opens summary.json in a folder, with these counts instead of those of the whole run."""
         path, counts = folder / "summary.json", counts or (self.counter.totals if self.counter else None)
-        usual_s = 1 / min(self.fps, self.settings.source.max_fps or inf)
+        usual_s = 1 / self.settings.source.looked_at_fps(self.fps)
         return Summary(path, self.source, self.settings, self.reading, counts, usual_s=usual_s)
 
 

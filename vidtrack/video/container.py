@@ -7,6 +7,7 @@ from contextlib import suppress
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
+from typing import TypeVar, cast
 
 import av
 from av.codec.hwaccel import HWAccel
@@ -16,9 +17,12 @@ from vidtrack.errors import SourceError
 from vidtrack.video.clock import FALLBACK_FPS, increasing_times, is_plausible, nominal_rate, stamp_rate
 from vidtrack.video.decoder import accelerator
 from vidtrack.video.header import avi_period_s, avi_states_rate, missing_bytes
+from vidtrack.video.max_rate import MaxRate
 from vidtrack.video.resources import decoders
 from vidtrack.video.span import ROUNDING_S
 from vidtrack.video.stats import SourceStats
+
+Coded = TypeVar("Coded", av.Packet, av.VideoFrame)
 
 _TEXT_CODECS = frozenset({"ansi", "bintext", "xbin", "idf"})  # FFmpeg draws any .txt file as a terminal would
 _RATE_PACKETS, _RATE_BYTES = 64, 32_000_000  # looked at for the rate; raw 4K video reaches the second bound first
@@ -29,8 +33,9 @@ class VideoFile:
 
     from_s  s; begin with the key picture before this time, and number the pictures from there
 
-    name, place, fps, frames as for Source. Damage is counted in `stats`, and reading continues with the next picture
-    that can be decoded. Raises SourceError for a file that is not a readable video.
+    name, place, fps, frames as for Source. Of more than `max_fps` pictures a second some of those between are left out
+    where that saves decoding, and never another one that `MaxRate` chooses. Damage is counted in `stats`, and reading
+    continues with the next picture that can be decoded. Raises SourceError for a file that is not a readable video.
     """
 
     def __init__(self, path: Path, settings: SourceSettings, stats: SourceStats, from_s: float = 0.0) -> None:
@@ -40,8 +45,9 @@ class VideoFile:
         self._from_s = from_s
         self._container = _open(path, accelerator(settings.decoder))
         self._stream = _video_stream(self._container, path)
-        self._stream.thread_type = "AUTO"
-        self._stream.codec_context.thread_count = decoders(self._stream.width * self._stream.height)
+        self._coder = self._stream.codec_context
+        self._coder.thread_type = "AUTO"
+        self._coder.thread_count = decoders(self._stream.width * self._stream.height)
         # AVI stores no presentation times, only the order of decoding: FFmpeg's guess at them jumps to and fro.
         self._is_avi = self._container.format.name == "avi"
         self._packets = self._demuxed()
@@ -54,11 +60,35 @@ class VideoFile:
             stats.mark_truncated(f"{path} is cut short: {missing} bytes are missing at its end")
 
     def __iter__(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
-        begin, pictures = self._from_key() if self._from_s > 0 else (0, self._decoded())
-        stamped = ((self._stamp(picture), picture) for picture in pictures)
-        times = increasing_times(stamped, self._ticks_per_s / self.fps)
-        for index, (ticks, picture) in enumerate(times):
+        if self._settings.max_fps is not None and self._coder.codec.intra_only and self._from_s == 0:
+            return self._looked_at()
+        return self._all()
+
+    def _all(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
+        begin, pictures = self._from_key() if self._from_s > 0 else (0, self._decoded(self._from_begin()))
+        for index, (ticks, picture) in enumerate(self._timed(pictures)):
             yield index, (begin + ticks) / self._ticks_per_s, picture
+
+    def _looked_at(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
+        """No more than `max_fps` pictures, of a codec whose packets are whole pictures: others are not decoded."""
+        self._coder.copy_opaque = True
+        for picture in self._decoded(self._packets_looked_at()):
+            index, time_s = cast(tuple[int, float], picture.opaque)
+            yield index, time_s, picture
+
+    def _packets_looked_at(self) -> Iterator[av.Packet | None]:
+        rate = MaxRate(self._settings.max_fps, since_s=0.0)
+        packets = (packet for packet in self._from_begin() if packet is not None)
+        for index, (ticks, packet) in enumerate(self._timed(packets)):
+            time_s = ticks / self._ticks_per_s
+            if rate.chooses(time_s):
+                packet.opaque = index, time_s
+                yield packet
+        yield None
+
+    def _timed(self, coded: Iterator[Coded]) -> Iterator[tuple[float, Coded]]:
+        """Packets or pictures with increasing times [ticks]."""
+        return increasing_times(((self._stamp(one), one) for one in coded), self._ticks_per_s / self.fps)
 
     def _from_key(self) -> tuple[int, Iterator[av.VideoFrame]]:
         """The ticks of the key picture before `from_s`, and the pictures from it on.
@@ -70,7 +100,7 @@ class VideoFile:
             with suppress(av.FFmpegError):  # no index: reading goes on where it was
                 self._container.seek(place, stream=self._stream)
             self._opening, self._packets = [], self._demuxed()
-            pictures = self._decoded()
+            pictures = self._decoded(self._from_begin())
             first = next(pictures, None)
             stamp = None if first is None else self._stamp(first)
             if first is not None and stamp is not None and stamp <= wanted:
@@ -105,7 +135,7 @@ class VideoFile:
             if every_s and not self._is_avi:
                 packets = self._needed(packets, begin_s, end_s, every_s)
             for packet in packets:
-                for picture in self._stream.codec_context.decode(packet):
+                for picture in self._coder.decode(packet):
                     stamp = self._stamp(picture)
                     if stamp is None:
                         return
@@ -133,10 +163,10 @@ class VideoFile:
         try:
             for packet in span:
                 spare = packet.pts is not None and packet.pts not in wanted
-                self._stream.codec_context.skip_frame = "NONREF" if spare else "DEFAULT"
+                self._coder.skip_frame = "NONREF" if spare else "DEFAULT"
                 yield packet
         finally:
-            self._stream.codec_context.skip_frame = "DEFAULT"
+            self._coder.skip_frame = "DEFAULT"
         yield from packets
 
     def _time_s(self, stamp: int) -> float:
@@ -145,7 +175,7 @@ class VideoFile:
     @cached_property
     def _origin(self) -> int:
         """The stamp of time 0."""
-        return next((self._stamp(picture) for picture in self._decoded()), None) or 0
+        return next((self._stamp(picture) for picture in self._decoded(self._from_begin())), None) or 0
 
     def close(self) -> None:
         """Close the file; not while another thread iterates."""
@@ -169,14 +199,18 @@ class VideoFile:
                 stuck = True
         yield None
 
-    def _decoded(self) -> Iterator[av.VideoFrame]:
+    def _from_begin(self) -> Iterator[av.Packet | None]:
+        """The packets from here on, those that the rate was measured by first."""
+        return chain(self._opening, self._packets)
+
+    def _decoded(self, packets: Iterator[av.Packet | None]) -> Iterator[av.VideoFrame]:
         """Decoded pictures, including damaged ones that the decoder concealed."""
         damaged = partial = False
-        for packet in chain(self._opening, self._packets):
+        for packet in packets:
             if packet is not None:
                 partial = packet.is_corrupt
             try:
-                pictures = self._stream.codec_context.decode(packet)
+                pictures = self._coder.decode(packet)
             except av.FFmpegError as error:
                 pictures, damaged = [], True
                 self._stats.count_error(f"a picture of {self._path} cannot be decoded: {error.strerror}")
@@ -235,7 +269,7 @@ class VideoFile:
         )
         return FALLBACK_FPS
 
-    def _stamp(self, coded: av.Packet | av.VideoFrame) -> int | None:
+    def _stamp(self, coded: Coded) -> int | None:
         return coded.dts if self._is_avi else coded.pts
 
     def _frames_by_duration(self) -> int | None:

@@ -13,6 +13,7 @@ import av
 
 from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
+from vidtrack.video.max_rate import MaxRate
 from vidtrack.video.sequence import read_sequence_info, untimed_rate
 from vidtrack.video.stats import SourceStats
 
@@ -34,12 +35,13 @@ class ImageSequence:
     """One picture per file, in natural order (img2 before img10), at a given frame rate.
 
     name, place, fps, frames as for Source. An image that cannot be read is counted and skipped; the numbers and times
-    of the others do not change.
+    of the others do not change. Of more than `max_fps` a second those between are not read.
     """
 
     def __init__(self, paths: Iterable[Path], settings: SourceSettings, stats: SourceStats) -> None:
         self._paths = sorted(paths, key=_natural)
         self._stats = stats
+        self._max_fps = settings.max_fps
         self.place = self._paths[0].parent
         info = read_sequence_info(self.place)
         self.name = info.name or _name(self.place.resolve())
@@ -47,7 +49,10 @@ class ImageSequence:
         self.frames = len(self._paths)
 
     def __iter__(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
+        rate = MaxRate(self._max_fps, since_s=0.0)
         for index, path in enumerate(self._paths):
+            if not rate.chooses(index / self.fps):
+                continue
             try:
                 picture = _read(path)
             except SourceError as error:

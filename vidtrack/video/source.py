@@ -116,7 +116,7 @@ class Source:
             raise SourceError(f"no picture of {pictures.name} can be decoded")
         self._first = first = to_frame(*begin)
         self.height, self.width = first.shape
-        self._looked_at_fps = min(self.fps, settings.max_fps or inf)
+        self._looked_at_fps = settings.looked_at_fps(self.fps)
         self.frames = None if pictures.frames is None else self._expected(pictures.frames)
         self._reduce: Callable[[Frame], Frame] = lambda frame: frame
         rate = MaxRate(settings.max_fps, since_s=0.0, after_s=first.time_s - 1 / self.fps if from_s else -inf)

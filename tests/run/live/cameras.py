@@ -196,7 +196,7 @@ class Picture:
 class Script:
     """A connection that plays a list: pictures, seconds to wait, or an error to raise; after its end it stalls."""
 
-    fps, codec, is_raw = 25.0, "script", False
+    fps, codec, is_raw, is_intra = 25.0, "script", False, False
     wait = staticmethod(time.sleep)
 
     def __init__(self, *acts):

@@ -72,14 +72,19 @@ def test_a_slow_tracker_gets_the_newest_frames_and_is_never_late():
     assert stats.frames_dropped > 50
 
 
-def test_pictures_beyond_the_rate_do_not_come_and_are_not_dropped():
-    with open_script(Script(*pictures(range(10, 70)), SILENT), settings=EVERY, max_fps=12.5) as source:
+@pytest.mark.parametrize("is_intra", [False, True])
+def test_pictures_beyond_the_rate_do_not_come_and_are_not_dropped(monkeypatch, is_intra):
+    """Whole compressed pictures are not even decoded."""
+    script, decoded = Script(*pictures(range(10, 70)), SILENT), []
+    monkeypatch.setattr(script, "is_intra", is_intra, raising=False)
+    monkeypatch.setattr(script, "decode", lambda packet: decoded.append(packet) or Script.decode(script, packet))
+    with open_script(script, settings=EVERY, max_fps=12.5) as source:
         wait_for(lambda: source.stats.received == 60)
         seen = take(source, 10)
-    steps = np.diff([frame.time_s for frame in seen])
-    assert np.all(steps > 0.04)
+    assert np.all(np.diff([frame.time_s for frame in seen]) > 0.04)
     assert [frame.index for frame in seen] == list(range(10))
     assert source.stats.frames_dropped == 0
+    assert len(decoded) < 40 if is_intra else len(decoded) == 60
 
 
 def test_every_frame_waits_instead_and_drops_none():

@@ -41,6 +41,7 @@ class Connection:
     fps    nominal frames/s, None if the stream does not state it
     codec  FFmpeg's name of the codec
     is_raw whether packets are uncompressed pictures; the pictures are then planar
+    is_intra whether packets are whole compressed pictures, so that any may be left out
 
     options  NAME=VALUE for FFmpeg; they override those of the address
     decoder  hardware that decodes
@@ -61,6 +62,7 @@ class Connection:
         self.fps = float(self.stream.average_rate or 0) or None
         self.codec = self._coder.name
         self.is_raw = self.codec == _RAW
+        self.is_intra = self._coder.codec.intra_only and not self.is_raw
         # Formats without time stamps get invented ones.
         flags = self._container.format.flags
         self._has_stamps = not flags & av.format.Flags.no_timestamps.value  # type: ignore[operator]

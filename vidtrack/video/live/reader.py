@@ -51,7 +51,7 @@ class Reader:
 
     connect  opens a Connection
     shots    queue for pictures; closed with an error if the source cannot be opened at the start
-    max_fps  pictures between so many a second are decoded and not delivered; None: all are delivered
+    max_fps  pictures between so many a second are not delivered, and decoded only if others need them; None: all are
     alive_s  monotonic time of the thread's last activity
     """
 
@@ -153,11 +153,14 @@ class Reader:
             if self._recorder.cut(connection, packet):
                 self._deliver(connection, connection.start_decoder_anew(), now_s)
             packet.opaque = self._recorder.place()
-            pictures = [] if skipping else self._decoded(connection, packet)
+            unwanted = live and connection.is_intra and not self._rate.chooses(now_s)
+            pictures = [] if skipping or unwanted else self._decoded(connection, packet)
             self._recorder.take(packet, pictures, now_s)
             self._stats.frames_dropped += skipping
             if pictures:
                 pictured_s = now_s
+            elif unwanted:
+                self._stats.arrived(now_s)
             elif now_s - pictured_s > self._settings.timeout_s:
                 raise Stalled(f"no picture could be decoded for {self._settings.timeout_s:g} s; is the stream damaged?")
             if live:
@@ -182,7 +185,7 @@ class Reader:
             self._report_stream(connection, picture)
             time_s = self._clock.time_s(connection.stamp_s(picture), now_s)
             self._stats.arrived(now_s)
-            if not self._rate.chooses(time_s):
+            if not (connection.is_intra or self._rate.chooses(time_s)):
                 continue
             place: Any = picture.opaque or self._recorder.place()
             shot = Shot(to_frame(0, time_s, picture), connection.fps, place)
