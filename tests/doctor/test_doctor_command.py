@@ -88,21 +88,10 @@ def test_a_source_or_warm_alone(wrong):
         doctor(*wrong)
 
 
-@pytest.mark.parametrize(
-    ("rate", "decode_s", "track_s", "options"),
-    [
-        (25.0, 0.002, 0.010, None),
-        (25.0, 0.010, 0.080, ("--scale 0.5",)),
-        (25.0, 0.010, 0.030, ("--max-fps 18",)),
-        (25.0, 0.050, 0.005, ()),
-        (100.0, None, 0.005, None),
-        (25.0, None, 0.200, ("--scale 0.333",)),
-    ],
-)
-def test_a_machine_that_is_too_slow(rate, decode_s, track_s, options):
-    findings = Findings(
+def found_at(rate, decode_s, track_s, kind="video"):
+    return Findings(
         source="x",
-        kind="live" if decode_s is None else "video",
+        kind="live" if decode_s is None else kind,
         width=640,
         height=480,
         fps=rate,
@@ -110,8 +99,29 @@ def test_a_machine_that_is_too_slow(rate, decode_s, track_s, options):
         timing=None,
         speed=Speed(decode_s, track_s),
     )
-    found = {advice.name: advice for advice in judge(findings, load())}
+
+
+@pytest.mark.parametrize(
+    ("rate", "decode_s", "track_s", "options"),
+    [
+        (25.0, 0.002, 0.010, None),
+        (25.0, 0.010, 0.080, ("--scale 0.5",)),
+        (25.0, 0.010, 0.030, ("--max-fps 16",)),
+        (25.0, 0.050, 0.005, ()),
+        (100.0, None, 0.005, None),
+        (25.0, None, 0.200, ("--scale 0.333",)),
+    ],
+)
+def test_a_machine_that_is_too_slow(rate, decode_s, track_s, options):
+    found = {advice.name: advice for advice in judge(found_at(rate, decode_s, track_s), load())}
     assert ("speed" in found) == (options is not None)
     if options is not None:
         assert found["speed"].problem
         assert found["speed"].options == options
+
+
+def test_fewer_pictures_a_second_are_advised_once_and_not_of_a_recording():
+    settings = load(assignments=["source.max_fps=16"])
+    assert list(judge(found_at(25.0, 0.010, 0.032), settings)) == []  # the time of a picture is never quite the same
+    (advice,) = judge(found_at(25.0, 0.010, 0.030, "recording"), load())
+    assert advice.options == ("--scale 0.5",)

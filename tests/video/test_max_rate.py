@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 from source_clips import picture, write_clip
 
 from vidtrack.config.settings import SourceSettings
-from vidtrack.video.container import VideoFile
+from vidtrack.errors import SourceError
 from vidtrack.video.max_rate import MaxRate
 from vidtrack.video.source import open_part, open_source
-from vidtrack.video.stats import SourceStats
 
 
 def chosen(times, *arguments, **options):
@@ -28,30 +27,31 @@ def read(path, opened=open_source, **settings):
     ("fps", "most", "expected"),
     [
         (25, 12.5, [0, 2, 4, 6, 8, 10]),
-        (25, 10, [0, 2, 5, 7, 10]),
+        (25, 10, [0, 3, 5, 8, 10]),
         (25, 25, list(range(12))),
         (10, 25, list(range(12))),
         (30, None, list(range(12))),
     ],
 )
 def test_pictures_are_chosen_as_evenly_as_they_come(fps, most, expected):
-    assert chosen(np.arange(12) / fps, most) == expected
+    assert chosen(np.arange(12) / fps, most, fps) == expected
 
 
-@given(st.floats(0, 100), st.lists(st.floats(-0.004, 0.004), min_size=60, max_size=60))
-def test_jitter_changes_no_choice_where_the_rate_is_a_whole_part(since_s, jitter):
-    times = since_s + np.arange(60) / 30 + np.array([0.0, *jitter[1:]])
-    assert chosen(times, 15) == list(range(0, 60, 2))
+@pytest.mark.parametrize("ratio", range(1, 9))
+@given(st.floats(0, 100), st.lists(st.floats(-0.3, 0.3), min_size=60, max_size=60))
+def test_jitter_changes_no_choice_where_the_rate_is_a_whole_part(ratio, since_s, jitter):
+    """Jitter of up to 0.3 of the time between two pictures."""
+    times = since_s + (np.arange(60) + np.array([0.0, *jitter[1:]])) / 30
+    assert chosen(times, 30 / ratio, 30, since_s) == list(range(0, 60, ratio))
 
 
-@given(st.lists(st.floats(0.001, 3.0), min_size=1, max_size=80), st.floats(0.2, 30))
+@given(st.lists(st.floats(0.001, 3.0), min_size=1, max_size=80), st.floats(1, 30))
 def test_there_are_no_more_and_a_slow_source_loses_none(steps, most):
     times = np.cumsum(steps)
     kept = times[chosen(times, most)]
     assert kept[0] == times[0]
     for begin_s in kept:
-        window = (kept >= begin_s) & (kept < begin_s + 5.0)
-        assert np.count_nonzero(window) <= 5.0 * most + 2
+        assert np.count_nonzero((kept >= begin_s) & (kept < begin_s + 5.0)) <= 5.0 * most + 2
     after_long = np.flatnonzero(np.diff(times) > 1.0 / most + 1e-9) + 1
     assert np.isin(times[after_long], kept).all()
 
@@ -68,18 +68,9 @@ def test_there_are_no_more_and_a_slow_source_loses_none(steps, most):
 def test_frames_of_a_file_keep_numbers_and_times(tmp_path, name, codec, pixels):
     path = write_clip(tmp_path / name, 40, codec, pixels)
     frames, source = read(path, max_fps=10)
-    assert frames == [(k, k / 25) for k in (0, 2, 5, 7, 10, 12, 15, 17, 20, 22, 25, 27, 30, 32, 35, 37)]
+    assert frames == [(k, k / 25) for k in (0, 3, 5, 8, 10, 13, 15, 18, 20, 23, 25, 28, 30, 33, 35, 38)]
     assert (source.fps, source.frames, source.stats.frames_read) == (25, 16, 16)
-    assert read(path, max_fps=10, start_s=0.15, end_s=0.5)[0] == [(5, 0.2), (7, 0.28), (10, 0.4), (12, 0.48)]
-
-
-def test_only_what_is_looked_at_is_decoded_where_packets_are_pictures(tmp_path):
-    path = write_clip(tmp_path / "clip.avi", 40, "mjpeg", "yuvj420p")
-    all_of_it = {index: found for index, _, found in VideoFile(path, SourceSettings(), SourceStats())}
-    chosen = list(VideoFile(path, SourceSettings(max_fps=10), SourceStats()))
-    assert [index for index, *_ in chosen] == [0, 2, 5, 7, 10, 12, 15, 17, 20, 22, 25, 27, 30, 32, 35, 37]
-    for index, _, found in chosen:
-        np.testing.assert_array_equal(found.to_ndarray(), all_of_it[index].to_ndarray())
+    assert read(path, max_fps=10, start_s=0.15, end_s=0.5)[0] == [(5, 0.2), (8, 0.32), (10, 0.4)]
 
 
 def test_images_between_are_not_read(tmp_path):
@@ -91,14 +82,33 @@ def test_images_between_are_not_read(tmp_path):
     assert source.stats.decode_errors == 0
 
 
-@pytest.mark.parametrize("start_s", [0.4, 0.44, 0.48, 0.8, 1.0])
-def test_a_part_has_the_pictures_of_the_whole(tmp_path, start_s):
-    path = write_clip(tmp_path / "clip.mp4", 40, "libx264")
-    whole = [time_s for _, time_s in read(path, max_fps=10)[0] if time_s >= start_s]
-    assert [time_s for _, time_s in read(path, open_part, max_fps=10, start_s=start_s)[0]] == whole
+VARIABLE_MS = np.cumsum([0, *[40, 40, 20, 90, 40, 35, 45, 120, 40, 40] * 6]).tolist()
 
 
-def test_the_opening_is_of_these_pictures_too(tmp_path):
-    with open_source(str(write_clip(tmp_path / "clip.avi", 40)), SourceSettings(max_fps=5)) as source:
-        assert [round(frame.time_s, 6) for frame in source.opening(0.9, None)] == [0.0, 0.16, 0.36, 0.56, 0.76]
-        assert [frame.index for frame in source] == [0, 4, 9, 14, 19, 24, 29, 34, 39]
+@pytest.mark.parametrize("start_s", [0.4, 0.44, 0.48, 0.8, 1.0, 2.3])
+@pytest.mark.parametrize("stamps", [None, VARIABLE_MS], ids=["constant", "variable"])
+def test_a_part_has_the_pictures_of_the_whole(tmp_path, start_s, stamps):
+    path = write_clip(tmp_path / "clip.mp4", 70, "libx264", stamps_ms=stamps)
+    whole, _ = read(path, max_fps=7)
+    found, source = read(path, open_part, max_fps=7, start_s=start_s)
+    expected = [frame for frame in whole if frame[1] >= start_s - 1e-6]
+    assert [time_s for _, time_s in found] == [time_s for _, time_s in expected]
+    shift = expected[0][0] - found[0][0]
+    assert [index + shift for index, _ in found] == [index for index, _ in expected]
+    assert whole[len(whole) - len(expected) - 1][0] == source.before + shift
+
+
+@pytest.mark.parametrize("room", [200_000_000, 0], ids=["kept", "read twice"])
+@pytest.mark.parametrize(("name", "codec"), [("clip.avi", "mpeg4"), ("clip.mp4", "libx264")])
+def test_the_opening_is_of_these_pictures_too(tmp_path, monkeypatch, room, name, codec):
+    monkeypatch.setattr("vidtrack.video.source._KEPT_BYTES", room)
+    path = str(write_clip(tmp_path / name, 40, codec, spare=2))
+    with open_source(path, SourceSettings(max_fps=5, start_s=0.3)) as source:
+        times = [round(frame.time_s, 6) for frame in source.opening(0.9, None, 0.2)]
+        assert times == [0.4, 0.6, 0.8, 1.0, 1.2]
+        assert [frame.index for frame in source] == [10, 15, 20, 25, 30, 35]
+
+
+def test_a_span_without_a_picture_to_look_at_says_so(tmp_path):
+    with pytest.raises(SourceError, match=r"no frame to look at between 0.04 s and 0.5 s"):
+        read(write_clip(tmp_path / "clip.avi", 40), max_fps=1, start_s=0.04, end_s=0.5)

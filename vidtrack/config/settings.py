@@ -24,8 +24,8 @@ class SourceSettings(Group):
     """s; frames after this media time are skipped; None: to the end"""
     fps: float | None = Field(None, gt=0, le=1000)
     """frames/s if the input has no times or wrong ones; None: from the video or seqinfo.ini, else 25"""
-    max_fps: float | None = Field(None, gt=0, le=1000)
-    """frames/s; of more pictures than this those between are not looked at; None: all are looked at"""
+    max_fps: float | None = Field(None, ge=1, le=1000)
+    """frames/s; no more than so many are looked at, evenly spaced; None: all"""
     scale: float | None = Field(None, gt=0, le=1)
     """processed over source size, rounded to 1, 1/2, 1/3, ...; None: the largest of these with at most 500 rows"""
     mask: Path | None = None

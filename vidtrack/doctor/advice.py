@@ -24,7 +24,8 @@ _MISSING, _REPEATED = 0.02, 0.05  # shares of the pictures
 _SLOW = 5.0  # pictures/s
 _WEAK = 0.7  # of the rate that the camera states
 _RESERVE = 0.8  # of the machine
-_ENOUGH = 10.0  # pictures/s at which of 96 crossings 94 are counted still
+_FOLLOWED = 0.9  # of what is left, so that advice that was followed is not given again
+_ENOUGH = 10.0  # pictures/s at which hardly fewer crossings are counted than at 25
 # pictures
 _THRESHOLD = "detector.disturbance.luma_threshold"
 _DIM, _BLACK = 100.0, 25.0  # 95th percentile of the grey level
@@ -78,7 +79,7 @@ def on_time(findings: Findings, settings: Settings) -> Iterator[Advice]:
     """Advice on time."""
     yield from _on_reception(findings)
     if findings.timing is not None:
-        yield from _on_rate(findings, findings.timing, settings)
+        yield from _on_rate(findings, findings.timing)
         yield from _on_gaps(findings.timing, settings)
     if findings.speed is not None:
         yield from _on_speed(findings, findings.speed, settings)
@@ -103,13 +104,12 @@ def _on_reception(findings: Findings) -> Iterator[Advice]:
         yield Advice("decoding", True, f"{text}: let the camera send a smaller picture, or fewer of them")
 
 
-def _on_rate(findings: Findings, timing: Timing, settings: Settings) -> Iterator[Advice]:
+def _on_rate(findings: Findings, timing: Timing) -> Iterator[Advice]:
     header = findings.reception.header_fps
     if header is not None and abs(header / findings.fps - 1) > _DISAGREEMENT:
         text = f"the header says {header:g} frames/s, the pictures' times {findings.fps:.4g}; the times are used"
         yield Advice("header", False, f"{text}, --fps overrules both")
-    promised = settings.source.looked_at_fps(findings.fps)
-    if findings.kind == "live" and timing.rate * (1 - timing.missing_share) < _WEAK * promised:
+    if findings.kind == "live" and timing.rate * (1 - timing.missing_share) < _WEAK * findings.fps:
         text = f"the camera promises {findings.fps:.3g} frames/s and gives {timing.rate:.3g}"
         yield Advice("promise", True, f"{text}: long exposure in the dark, or a weak network")
     if timing.rate < _SLOW:
@@ -137,22 +137,25 @@ def _on_gaps(timing: Timing, settings: Settings) -> Iterator[Advice]:
 
 
 def _on_speed(findings: Findings, speed: Speed, settings: Settings) -> Iterator[Advice]:
-    needed = findings.timing.rate if findings.timing else findings.fps
-    if speed.rate * _RESERVE > needed:
+    coming = findings.timing.rate if findings.timing else findings.fps
+    needed = settings.source.looked_at_fps(coming)
+    decoding = coming * (speed.decode_s or 0.0)
+    busy = decoding + needed * speed.track_s
+    if busy < _RESERVE:
         return
     then = (
         "frames will be dropped" if findings.kind == "live" else "a file takes longer than it plays, live it would drop"
     )
-    text = f"this machine tracks {speed.rate:.3g} of {needed:.3g} frames/s: {then}"
-    left_s = _RESERVE / needed - (speed.decode_s or 0.0)
-    if left_s <= 0:
+    text = f"{needed:.3g} frames/s keep this machine busy for {busy:.0%} of the time: {then}"
+    left = _RESERVE - decoding
+    if left <= 0:
         yield Advice("speed", True, f"{text}; decoding alone is too slow: a smaller picture or a simpler codec")
         return
-    fps = math.floor((_RESERVE - needed * (speed.decode_s or 0.0)) / speed.track_s)
-    if fps >= _ENOUGH:
+    fps = math.floor(_FOLLOWED * left / speed.track_s)
+    if fps >= _ENOUGH and findings.kind != "recording":
         yield Advice("speed", True, text, (f"--max-fps {fps}",))
         return
-    step = math.ceil(reduction(findings.height, settings.source.scale) * math.sqrt(speed.track_s / left_s))
+    step = math.ceil(reduction(findings.height, settings.source.scale) * math.sqrt(needed * speed.track_s / left))
     yield Advice("speed", True, text, (scale_option(step),))
 
 

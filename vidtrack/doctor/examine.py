@@ -14,6 +14,7 @@ from vidtrack.doctor.findings import Findings, Reception, Speed
 from vidtrack.doctor.objects import ObjectMeter, finer
 from vidtrack.doctor.opening import is_live, looked_at, open_pictures
 from vidtrack.errors import SourceError
+from vidtrack.recording.source import is_recording
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
 from vidtrack.tracking.tracker import Tracker
@@ -34,7 +35,7 @@ _BLOCKS_EVERY = 25  # frames
 
 
 def examine(source: str, settings: Settings, seconds: float = 10.0) -> Findings:
-    """Measure `seconds` of a source.
+    """Measure `seconds` of a source, all its pictures, whatever `source.max_fps`.
 
     A live source is only read for half of the time, for its timing, and tracked for the other half. A file is read
     twice. Raises SourceError if the source cannot be opened, yields no picture or stops before it is tracked,
@@ -42,6 +43,8 @@ def examine(source: str, settings: Settings, seconds: float = 10.0) -> Findings:
     """
     if is_detections(source):
         return _of_detections(source, settings)
+    every = settings.source.model_copy(update={"max_fps": None})
+    settings = settings.model_copy(update={"source": every})
     live = is_live(source)
     span = seconds / 2 if live else seconds
     patience_s, quiet_s = _PATIENCE * seconds, _QUIET * settings.live.timeout_s
@@ -61,7 +64,7 @@ def examine(source: str, settings: Settings, seconds: float = 10.0) -> Findings:
     pace = timing(times, watch.samples.repeats) if len(times) > 1 else None
     return Findings(
         source=redact(source),
-        kind="live" if live else "video",
+        kind="live" if live else "recording" if is_recording(source) else "video",
         width=opened.width,
         height=opened.height,
         fps=opened.fps,

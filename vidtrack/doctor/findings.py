@@ -80,7 +80,7 @@ class Findings:
     """All measurements of a source.
 
     source         without credentials
-    kind           "video", "live" or "detections"
+    kind           "video", "recording" (of a live run), "live" or "detections"
     width, height  px
     fps            nominal rate of a run [1/s]
     timing         None with fewer than two pictures

@@ -26,6 +26,8 @@ def kind_of(source: str) -> Input:
     """The kind of the source."""
     if is_detections(source):
         return Input.DETECTIONS
+    if is_recording(source):
+        return Input.RECORDING
     return Input.CAMERA if is_live(source) else Input.VIDEO
 
 
@@ -33,8 +35,7 @@ def open_pictures(source: str, settings: Settings) -> Source | LiveSource | Reco
     """A source of frames. Raises SourceError if it cannot be opened."""
     if is_live(source):
         address = parse_address(source, settings.live.timeout_s)
-        connect = connection_to(address, settings)
-        return LiveSource(address, settings.live, max_fps=settings.source.max_fps, connect=connect)
+        return LiveSource(address, settings.live, connect=connection_to(address, settings))
     if is_recording(source):
         return Recording(source)
     return open_source(source, settings.source)

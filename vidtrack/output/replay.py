@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -81,11 +82,13 @@ def steps(run: FinishedRun, frames: Iterable[Frame] | None = None) -> Iterator[S
 
 
 def _table_times(number: Ints, time_s: Floats) -> Iterator[tuple[int, float, None]]:
-    """Number and time of each frame; the time of a frame without tracks is interpolated."""
+    """Number and time of each frame, at the usual distance; the time of a frame without tracks is interpolated."""
     frames, first = np.unique(number, return_index=True)
     if not len(frames):
         return
-    every = np.arange(frames[0], frames[-1] + 1)
+    usual = int(np.median(np.diff(frames))) if len(frames) > 1 else 1
+    empty = [np.arange(a + usual, b - usual / 2, usual) for a, b in pairwise(frames)]
+    every = np.sort(np.concatenate([frames, *empty])).astype(int)
     times = np.interp(every, frames, time_s[first])
     yield from ((index, time_s, None) for index, time_s in zip(every.tolist(), times.tolist(), strict=True))
 
@@ -94,7 +97,7 @@ def _tracks(t: float, rows: dict[str, np.ndarray]) -> Tracks:
     """Tracks of one frame; values missing in the table are NaN, and velocities have no covariance."""
     count = len(rows["track_id"])
     unknown = np.full(count, np.nan)
-    unit = "m" if "x_m" in rows else "px"
+    unit = "m" if "vx_m_s" in rows else "px"
     axes = [axis for axis in "xyz" if f"{axis}_{unit}" in rows]
     states = [column for axis in axes for column in (rows[f"{axis}_{unit}"], rows[f"v{axis}_{unit}_s"])]
     sigma = np.column_stack([rows[f"sigma_{axis}_{unit}"] for axis in axes])

@@ -65,6 +65,11 @@ class Subject:
         return replace(self, road=site.road, site=site.text, classes=site.classes)
 
     @property
+    def looked_at_fps(self) -> float:
+        """Nominal rate of the steps [1/s]."""
+        return self.settings.source.looked_at_fps(self.fps)
+
+    @property
     def lines(self) -> Sequence[Line]:
         """The counted lines."""
         return self.counter.lines if self.counter else ()
@@ -72,8 +77,7 @@ class Subject:
     def summary(self, folder: Path, counts: Callable[[], Mapping[str, Mapping[str, int]]] | None = None) -> Summary:
         """Opens summary.json in a folder, with these counts instead of those of the whole run."""
         path, counts = folder / "summary.json", counts or (self.counter.totals if self.counter else None)
-        usual_s = 1 / self.settings.source.looked_at_fps(self.fps)
-        return Summary(path, self.source, self.settings, self.reading, counts, usual_s=usual_s)
+        return Summary(path, self.source, self.settings, self.reading, counts, usual_s=1 / self.looked_at_fps)
 
 
 class FileSource(Protocol):
@@ -186,7 +190,7 @@ def picture_sinks(subject: Subject, extras: Extras) -> Iterator[tuple[str, Sink]
     if extras.video is not None:
         from vidtrack.output.video import AnnotatedVideo
 
-        yield "video", AnnotatedVideo(extras.video, subject.fps, settings.output, subject.lines)
+        yield "video", AnnotatedVideo(extras.video, subject.looked_at_fps, settings.output, subject.lines)
     if extras.rerun is not None:
         from vidtrack.output.rerun.pictures import RerunSink
 

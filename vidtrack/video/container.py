@@ -7,7 +7,6 @@ from contextlib import suppress
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import TypeVar, cast
 
 import av
 from av.codec.hwaccel import HWAccel
@@ -22,8 +21,6 @@ from vidtrack.video.resources import decoders
 from vidtrack.video.span import ROUNDING_S
 from vidtrack.video.stats import SourceStats
 
-Coded = TypeVar("Coded", av.Packet, av.VideoFrame)
-
 _TEXT_CODECS = frozenset({"ansi", "bintext", "xbin", "idf"})  # FFmpeg draws any .txt file as a terminal would
 _RATE_PACKETS, _RATE_BYTES = 64, 32_000_000  # looked at for the rate; raw 4K video reaches the second bound first
 
@@ -33,9 +30,9 @@ class VideoFile:
 
     from_s  s; begin with the key picture before this time, and number the pictures from there
 
-    name, place, fps, frames as for Source. Of more than `max_fps` pictures a second some of those between are left out
-    where that saves decoding, and never another one that `MaxRate` chooses. Damage is counted in `stats`, and reading
-    continues with the next picture that can be decoded. Raises SourceError for a file that is not a readable video.
+    name, place, fps, frames as for Source. No more than `max_fps` a second come, with the numbers and times that they
+    have among all. Damage is counted in `stats`, and reading continues with the next picture
+    that can be decoded. Raises SourceError for a file that is not a readable video.
     """
 
     def __init__(self, path: Path, settings: SourceSettings, stats: SourceStats, from_s: float = 0.0) -> None:
@@ -45,9 +42,8 @@ class VideoFile:
         self._from_s = from_s
         self._container = _open(path, accelerator(settings.decoder))
         self._stream = _video_stream(self._container, path)
-        self._coder = self._stream.codec_context
-        self._coder.thread_type = "AUTO"
-        self._coder.thread_count = decoders(self._stream.width * self._stream.height)
+        self._stream.thread_type = "AUTO"
+        self._stream.codec_context.thread_count = decoders(self._stream.width * self._stream.height)
         # AVI stores no presentation times, only the order of decoding: FFmpeg's guess at them jumps to and fro.
         self._is_avi = self._container.format.name == "avi"
         self._packets = self._demuxed()
@@ -60,47 +56,27 @@ class VideoFile:
             stats.mark_truncated(f"{path} is cut short: {missing} bytes are missing at its end")
 
     def __iter__(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
-        if self._settings.max_fps is not None and self._coder.codec.intra_only and self._from_s == 0:
-            return self._looked_at()
-        return self._all()
-
-    def _all(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
-        begin, pictures = self._from_key() if self._from_s > 0 else (0, self._decoded(self._from_begin()))
-        for index, (ticks, picture) in enumerate(self._timed(pictures)):
-            yield index, (begin + ticks) / self._ticks_per_s, picture
-
-    def _looked_at(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
-        """No more than `max_fps` pictures, of a codec whose packets are whole pictures: others are not decoded."""
-        self._coder.copy_opaque = True
-        for picture in self._decoded(self._packets_looked_at()):
-            index, time_s = cast(tuple[int, float], picture.opaque)
-            yield index, time_s, picture
-
-    def _packets_looked_at(self) -> Iterator[av.Packet | None]:
-        rate = MaxRate(self._settings.max_fps, since_s=0.0)
-        packets = (packet for packet in self._from_begin() if packet is not None)
-        for index, (ticks, packet) in enumerate(self._timed(packets)):
-            time_s = ticks / self._ticks_per_s
+        begin, pictures = self._from_key() if self._from_s > 0 else (0, self._decoded())
+        stamped = ((self._stamp(picture), picture) for picture in pictures)
+        times = increasing_times(stamped, self._ticks_per_s / self.fps)
+        rate = self._max_rate()
+        for index, (ticks, picture) in enumerate(times):
+            time_s = (begin + ticks) / self._ticks_per_s
             if rate.chooses(time_s):
-                packet.opaque = index, time_s
-                yield packet
-        yield None
-
-    def _timed(self, coded: Iterator[Coded]) -> Iterator[tuple[float, Coded]]:
-        """Packets or pictures with increasing times [ticks]."""
-        return increasing_times(((self._stamp(one), one) for one in coded), self._ticks_per_s / self.fps)
+                yield index, time_s, picture
 
     def _from_key(self) -> tuple[int, Iterator[av.VideoFrame]]:
         """The ticks of the key picture before `from_s`, and the pictures from it on.
 
+        Of no more than `max_fps` it is that before one interval more: those from `from_s` on are then the right ones.
         The whole file where no such place is found: then pictures have no stamps, or there is no index.
         """
-        wanted = self._origin + int(self._from_s * self._ticks_per_s)
+        wanted = self._origin + int(max(0.0, self._from_s - self._interval_s) * self._ticks_per_s)
         for place in (wanted, self._origin):
             with suppress(av.FFmpegError):  # no index: reading goes on where it was
                 self._container.seek(place, stream=self._stream)
             self._opening, self._packets = [], self._demuxed()
-            pictures = self._decoded(self._from_begin())
+            pictures = self._decoded()
             first = next(pictures, None)
             stamp = None if first is None else self._stamp(first)
             if first is not None and stamp is not None and stamp <= wanted:
@@ -110,21 +86,23 @@ class VideoFile:
     def between(self, begin_s: float, end_s: float, every_s: float = 0.0) -> Iterator[tuple[float, av.VideoFrame]]:
         """(time, picture) of a span of time, decoded from the key frame before it; spans in any order.
 
-        Only pictures that lie `every_s` apart are needed; those between them are left out where that saves decoding.
+        Only pictures that lie `every_s` apart are needed; those between them are left out where that saves decoding,
+        but not with `max_fps`, with which there are few.
         Where pictures have no stamps, or the place in the file is not found, the file is read from its beginning.
         Iterate over the whole file or over spans, not both.
         """
-        near = self._after_key_frame(begin_s, end_s, every_s)
+        near = self._after_key_frame(max(0.0, begin_s - self._interval_s), end_s, every_s)
         first = next(near, None)
         if first is None or first[0] > begin_s + 1 / self.fps:
             again = VideoFile(self._path, self._settings, SourceStats(told=True))
             near = ((time_s, picture) for _, time_s, picture in again)
         else:
             near = chain([first], near)
+        rate = self._max_rate()
         for time_s, picture in near:
             if time_s > end_s + ROUNDING_S:
                 break
-            if time_s >= begin_s - ROUNDING_S:
+            if rate.chooses(time_s) and time_s >= begin_s - ROUNDING_S:
                 yield time_s, picture
 
     def _after_key_frame(self, begin_s: float, end_s: float, every_s: float) -> Iterator[tuple[float, av.VideoFrame]]:
@@ -132,10 +110,10 @@ class VideoFile:
         try:
             self._container.seek(int(self._origin + begin_s * self._ticks_per_s), stream=self._stream)
             packets = self._container.demux(self._stream)
-            if every_s and not self._is_avi:
+            if every_s and not self._is_avi and self._settings.max_fps is None:
                 packets = self._needed(packets, begin_s, end_s, every_s)
             for packet in packets:
-                for picture in self._coder.decode(packet):
+                for picture in self._stream.codec_context.decode(packet):
                     stamp = self._stamp(picture)
                     if stamp is None:
                         return
@@ -163,10 +141,10 @@ class VideoFile:
         try:
             for packet in span:
                 spare = packet.pts is not None and packet.pts not in wanted
-                self._coder.skip_frame = "NONREF" if spare else "DEFAULT"
+                self._stream.codec_context.skip_frame = "NONREF" if spare else "DEFAULT"
                 yield packet
         finally:
-            self._coder.skip_frame = "DEFAULT"
+            self._stream.codec_context.skip_frame = "DEFAULT"
         yield from packets
 
     def _time_s(self, stamp: int) -> float:
@@ -175,7 +153,15 @@ class VideoFile:
     @cached_property
     def _origin(self) -> int:
         """The stamp of time 0."""
-        return next((self._stamp(picture) for picture in self._decoded(self._from_begin())), None) or 0
+        return next((self._stamp(picture) for picture in self._decoded()), None) or 0
+
+    def _max_rate(self) -> MaxRate:
+        return MaxRate(self._settings.max_fps, self.fps, since_s=0.0)
+
+    @property
+    def _interval_s(self) -> float:
+        """Time in which one picture is looked at; 0 if all are."""
+        return 0.0 if self._settings.max_fps is None else 1 / self._settings.max_fps
 
     def close(self) -> None:
         """Close the file; not while another thread iterates."""
@@ -199,18 +185,14 @@ class VideoFile:
                 stuck = True
         yield None
 
-    def _from_begin(self) -> Iterator[av.Packet | None]:
-        """The packets from here on, those that the rate was measured by first."""
-        return chain(self._opening, self._packets)
-
-    def _decoded(self, packets: Iterator[av.Packet | None]) -> Iterator[av.VideoFrame]:
+    def _decoded(self) -> Iterator[av.VideoFrame]:
         """Decoded pictures, including damaged ones that the decoder concealed."""
         damaged = partial = False
-        for packet in packets:
+        for packet in chain(self._opening, self._packets):
             if packet is not None:
                 partial = packet.is_corrupt
             try:
-                pictures = self._coder.decode(packet)
+                pictures = self._stream.codec_context.decode(packet)
             except av.FFmpegError as error:
                 pictures, damaged = [], True
                 self._stats.count_error(f"a picture of {self._path} cannot be decoded: {error.strerror}")
@@ -269,7 +251,7 @@ class VideoFile:
         )
         return FALLBACK_FPS
 
-    def _stamp(self, coded: Coded) -> int | None:
+    def _stamp(self, coded: av.Packet | av.VideoFrame) -> int | None:
         return coded.dts if self._is_avi else coded.pts
 
     def _frames_by_duration(self) -> int | None:

@@ -2,39 +2,34 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import floor, inf
 
-import numpy as np
-
-_EARLY = 0.25
-"""Share of an interval by which a picture may come before it: stamps are rounded, and cameras jitter"""
+_EARLY, _EARLY_PICTURE = 0.25, 0.4
+"""A picture may come before its interval by these shares of the interval and of the time from picture to picture, the
+lesser of both: stamps are rounded, and cameras jitter"""
 
 
 class MaxRate:
-    """Chooses the first picture in each of equal intervals of time, so that there are no more than `fps` a second.
+    """Chooses the first picture in each of equal intervals of time, so that there are no more than `most` a second.
 
-    fps      frames/s; None: all pictures are chosen
+    most     frames/s; None: all pictures are chosen
+    fps      nominal frames/s of the source; all are chosen if these are no more than `most`; None: not known for sure
     since_s  begin of an interval [s]; None: the time of the first picture
-    after_s  time of the picture before the first one [s]; -inf: there was none
 
-    With `since_s`, the intervals do not depend on the pictures: readings of a video from different places agree.
+    With `since_s`, readings of a video from different places agree one interval after they begin.
     """
 
-    def __init__(self, fps: float | None, since_s: float | None = None, after_s: float = -inf) -> None:
-        self._fps = fps
+    def __init__(self, most: float | None, fps: float | None = None, since_s: float | None = None) -> None:
+        self._most = None if most is None or (fps is not None and fps <= most) else most
+        self._early = _EARLY if fps is None or most is None else min(_EARLY, _EARLY_PICTURE * most / fps)
         self._since_s = since_s
-        self._last = -inf if fps is None or since_s is None else _interval(after_s - since_s, fps)
+        self._last = -inf
 
     def chooses(self, time_s: float) -> bool:
         """Whether the picture of this time is looked at; times do not decrease."""
-        if self._fps is None:
+        if self._most is None:
             return True
         if self._since_s is None:
             self._since_s = time_s
-        last, self._last = self._last, _interval(time_s - self._since_s, self._fps)
+        last, self._last = self._last, floor((time_s - self._since_s) * self._most + self._early)
         return self._last > last
-
-
-def _interval(time_s: float, fps: float) -> float:
-    """Number of the interval to which a time belongs."""
-    return float(np.floor(time_s * fps + _EARLY))

@@ -49,25 +49,28 @@ class ImageSequence:
         self.frames = len(self._paths)
 
     def __iter__(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
-        rate = MaxRate(self._max_fps, since_s=0.0)
-        for index, path in enumerate(self._paths):
-            if not rate.chooses(index / self.fps):
-                continue
+        for index in self._looked_at():
             try:
-                picture = _read(path)
+                picture = _read(self._paths[index])
             except SourceError as error:
                 self._stats.count_error(str(error))
                 continue
             yield index, index / self.fps, picture
 
     def between(self, begin_s: float, end_s: float, every_s: float = 0.0) -> Iterator[tuple[float, av.VideoFrame]]:
-        """(time, picture) of a span of time; all, also those less than `every_s` apart."""
+        """(time, picture) of a span of time; also those less than `every_s` apart."""
         first, last = ceil(begin_s * self.fps - 1e-6), floor(end_s * self.fps + 1e-6)
-        for index in range(max(first, 0), min(last + 1, len(self._paths))):
+        for index in self._looked_at():
+            if not first <= index <= last:
+                continue
             try:
                 yield index / self.fps, _read(self._paths[index])
             except SourceError as error:
                 self._stats.count_error(str(error))
+
+    def _looked_at(self) -> Iterator[int]:
+        rate = MaxRate(self._max_fps, self.fps, since_s=0.0)
+        return (index for index in range(len(self._paths)) if rate.chooses(index / self.fps))
 
     def close(self) -> None:
         """Do nothing: no file stays open between images."""

@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from itertools import chain
-from math import inf
 from pathlib import Path
 from types import TracebackType
 
@@ -16,7 +15,6 @@ from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.container import VideoFile
 from vidtrack.video.frame import Frame
-from vidtrack.video.max_rate import MaxRate
 from vidtrack.video.pictures import ImageSequence, images_in, images_like
 from vidtrack.video.planes import matched, to_frame
 from vidtrack.video.readahead import ReadAhead
@@ -89,13 +87,14 @@ class Excerpts:
 class Source:
     """The frames of an input from `start_s` to `end_s`, read in a thread of their own; iterate once.
 
-    Of more than `max_fps` pictures a second those between have numbers and times, and do not come.
+    No more than `max_fps` a second come, with the numbers and times that they have among all.
 
     name           default name of the run
     place          the file, or the folder of the images
     width, height  of the first picture [px]; later ones of another size are scaled to it
     fps            nominal frames/s; each frame has its own time
     frames         expected number, for progress bars only; None if unknown
+    before         number of the last frame before the span; None: there is none, or it is not read yet
     stats          counts of frames and problems
 
     Iterating raises SourceError if the span of time holds no frame.
@@ -109,19 +108,18 @@ class Source:
         self.place = pictures.place
         self.fps = pictures.fps
         self.stats = stats
-        decoded = iter(pictures)
-        begin = next(decoded, None)
-        if begin is None:
+        frames = (to_frame(*picture) for picture in pictures)
+        first = next(frames, None)
+        if first is None:
             pictures.close()
             raise SourceError(f"no picture of {pictures.name} can be decoded")
-        self._first = first = to_frame(*begin)
+        self._first = first
         self.height, self.width = first.shape
         self._looked_at_fps = settings.looked_at_fps(self.fps)
         self.frames = None if pictures.frames is None else self._expected(pictures.frames)
+        self.before: int | None = None
         self._reduce: Callable[[Frame], Frame] = lambda frame: frame
-        rate = MaxRate(settings.max_fps, since_s=0.0, after_s=first.time_s - 1 / self.fps if from_s else -inf)
-        frames = (to_frame(*picture) for picture in chain([begin], decoded) if rate.chooses(picture[1]))
-        self._ahead = ReadAhead(self._reduced(self._alike(self._in_span(frames), first)), _DEPTH)
+        self._ahead = ReadAhead(self._reduced(self._alike(self._in_span(chain([first], frames)), first)), _DEPTH)
         self._opened: deque[Frame] = deque()  # frames of the opening, kept for the reading
 
     def __iter__(self) -> Source:
@@ -202,8 +200,11 @@ class Source:
             if self._span.begun(last_s):
                 empty = False
                 yield frame
+            else:
+                self.before = frame.index
         if empty:
-            raise SourceError(f"{self.name} has no frame between {self._span}; the last one read is at {last_s:g} s")
+            where = f"between {self._span}" if self._settings.max_fps is None else f"to look at between {self._span}"
+            raise SourceError(f"{self.name} has no frame {where}; the last one read is at {last_s:g} s")
 
     def _reduced(self, frames: Iterator[Frame]) -> Iterator[Frame]:
         return (self._reduce(frame) for frame in frames)  # as it is when the frame is read

@@ -69,13 +69,14 @@ def table_of(*ways, columns=COLUMNS):
     )
 
 
-def write_run(folder, *ways, site=SITE, columns=COLUMNS, fps=FPS):
+def write_run(folder, *ways, site=SITE, columns=COLUMNS, fps=FPS, max_fps=None):
     """A finished run; returns its folder."""
     run = folder / "run"
     run.mkdir(parents=True)
     (folder / "site.toml").write_text(site)
     pq.write_table(table_of(*ways, columns=columns), run / "tracks.parquet")
-    summary = {"fps": fps, "settings": {"output": {"site": str(folder / "site.toml")}}}
+    settings = {"output": {"site": str(folder / "site.toml")}, "source": {"max_fps": max_fps}}
+    summary = {"fps": fps, "settings": settings}
     (run / "summary.json").write_text(json.dumps(summary))
     return run
 

@@ -5,11 +5,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from road_runs import hide, usual_ways, way, write_run
 
-from vidtrack.output.export import road_run
+from vidtrack.errors import ConfigError
+from vidtrack.output.export import level_x, road_run
 from vidtrack.output.export.pieces import pieces
 from vidtrack.output.export.road_run import open_road_run
 
@@ -51,3 +53,17 @@ def test_a_piece_comes_out_before_the_run_is_read_to_its_end(tmp_path, monkeypat
 def test_a_guess_that_was_confirmed_stays_and_the_last_one_goes(tmp_path):
     (lorry,) = (piece for piece in pieces(open_road_run(write_run(tmp_path, *usual_ways()))) if piece.track == 9)
     assert lorry.rows.frame.tolist() == list(range(20, 61))
+
+
+@pytest.mark.parametrize("batch", [3, 1 << 16])
+def test_frames_that_nobody_looked_at_are_no_gap(tmp_path, monkeypatch, batch):
+    monkeypatch.setattr(road_run, "_BATCH", batch)
+    looked_at = [0, 2, 5, 7, 10, 12, 15, 20, 22]  # ten of 25 a second; the vehicle is missing at 17
+    found = list(pieces(open_road_run(write_run(tmp_path, way(1, looked_at), max_fps=10))))
+    assert [piece.rows.frame.tolist() for piece in found] == [looked_at[:7], looked_at[7:]]
+
+
+def test_level_x_which_has_all_frames_refuses_a_run_that_has_not(tmp_path):
+    run = open_road_run(write_run(tmp_path, way(1, [0, 2, 5, 7]), max_fps=10))
+    with pytest.raises(ConfigError, match=r"rows of one in 0\.1 s: track without source\.max_fps"):
+        level_x.write(run, tmp_path)

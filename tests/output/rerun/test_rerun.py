@@ -9,6 +9,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 from synthetic_steps import make_step
@@ -61,12 +63,13 @@ def test_a_recording_that_cannot_be_written_is_refused(tmp_path):
         RerunSink(str(tmp_path / "missing" / "a.rrd"), SHAPE, Settings())
 
 
-def finished_run(folder, source):
+def finished_run(folder, source, frames=(None, 1, 2, 3, None, 5, 6, 7)):
     reading = {"fps": 25.0, "width": SHAPE[1], "height": SHAPE[0]}
     summary = Summary(folder / "summary.json", source, Settings(), lambda: reading)
     table = TrackTable(folder)
-    for index in range(8):
-        step = make_step(index, [] if index in (0, 4) else [(1, "c", 10 * index, 20), (2, "m", 30, 30)])
+    for number, index in enumerate(frames):
+        rows = [] if index is None else [(1, "c", 10 * index, 20), (2, "m", 30, 30)]
+        step = make_step(number if index is None else index, rows)
         summary.step(step)
         table.step(step)
     table.close()
@@ -86,6 +89,26 @@ def test_steps_of_a_finished_run_are_those_that_were_written(tmp_path):
     found = steps[5].tracks
     for name in ("id", "status", "xy", "v", "xy_cov", "box", "group", "nis"):
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=1e-3)
+
+
+def test_frames_that_nobody_looked_at_are_no_steps_of_a_finished_run(tmp_path):
+    from vidtrack.output import replay
+
+    finished_run(tmp_path, "gone.avi", [0, 2, 5, 7, 10, 20, 22])
+    found = [(step.index, len(step.tracks)) for step in replay.steps(replay.read_run(tmp_path))]
+    assert found == [(0, 2), (2, 2), (5, 2), (7, 2), (10, 2), (12, 0), (14, 0), (16, 0), (18, 0), (20, 2), (22, 2)]
+
+
+def test_a_run_at_a_calibrated_site_is_shown_in_pixels(tmp_path):
+    from vidtrack.output import replay
+
+    finished_run(tmp_path, "gone.avi")
+    table = pq.read_table(tmp_path / "tracks.parquet")
+    for name in ("x_m", "y_m"):
+        table = table.append_column(name, pa.array(np.full(len(table), 7.0)))
+    pq.write_table(table, tmp_path / "tracks.parquet")
+    first = next(iter(replay.steps(replay.read_run(tmp_path))))
+    assert first.tracks.xy.tolist() == [[10.0, 20.0], [30.0, 30.0]]
 
 
 def test_view_saves_a_recording_over_the_background_when_the_source_is_gone(tmp_path):

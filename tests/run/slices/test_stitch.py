@@ -3,7 +3,10 @@
 import filecmp
 import json
 from dataclasses import asdict
+from fractions import Fraction
 
+import av
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from command_line import SAMPLES
@@ -30,14 +33,14 @@ def finish(run):
             pass
 
 
-def stitched(folder, found, settings=SETTINGS):
+def stitched(folder, found, settings=SETTINGS, video=VIDEO):
     """The run of these slices, in `folder`."""
     parts = [folder / str(one.number) for one in found]
     for one, part in zip(found, parts, strict=True):
         part.mkdir(parents=True)
         before = parts[one.number - 1] if one.goes_on else None
-        track_slice(VIDEO, settings, one, part, before, lambda: None)
-    finish(Run(stitched_pipeline(VIDEO, found, parts, settings), folder / "whole"))
+        track_slice(video, settings, one, part, before, lambda: None)
+    finish(Run(stitched_pipeline(video, found, parts, settings), folder / "whole"))
     return folder / "whole"
 
 
@@ -53,13 +56,34 @@ def halves(tmp_path_factory):
     return stitched(tmp_path_factory.mktemp("halves"), cuts(0.0, None, 10.0, 5.0, 4.0))
 
 
-@pytest.mark.parametrize("max_fps", [None, 7.0])
-def test_slices_that_go_on_from_each_other_are_the_single_run_bit_by_bit(max_fps, tmp_path):
-    """The second begins in the middle of a crossing; the last one lies beyond the end of the file."""
+def uneven(path):
+    """The sample's pictures at uneven times, none from 3.6 to 5.1 s."""
+    with av.open(VIDEO) as film:
+        pictures = [picture.to_ndarray(format="bgr24") for picture in film.decode(video=0)]
+    steps = np.resize([40, 70, 90, 66, 67], len(pictures))
+    steps[54] += 1500
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("ffv1", rate=15)
+        stream.height, stream.width = pictures[0].shape[:2]
+        stream.pix_fmt, stream.codec_context.time_base = "yuv420p", Fraction(1, 1000)
+        for stamp, picture in zip(np.cumsum(steps).tolist(), pictures, strict=True):
+            frame = av.VideoFrame.from_ndarray(picture, format="bgr24").reformat(format="yuv420p")
+            frame.pts, frame.time_base = stamp, Fraction(1, 1000)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("video", "max_fps"), [("crossing", None), ("crossing", 7.0), ("junction", 7.0), ("uneven", None), ("uneven", 5.0)]
+)
+def test_slices_that_go_on_from_each_other_are_the_single_run_bit_by_bit(video, max_fps, tmp_path):
+    """The second begins in the middle of a crossing; the last one may lie beyond the end of the file."""
     settings = load(assignments=[("source.max_fps", max_fps)], base=SETTINGS.model_dump())
+    path = uneven(tmp_path / "uneven.mkv") if video == "uneven" else str(SAMPLES / f"{video}.avi")
     single = tmp_path / "single"
-    finish(run_file(VIDEO, settings, single))
-    whole = stitched(tmp_path, cuts(0.0, None, 12.0, 4.0, None), settings)
+    finish(run_file(path, settings, single))
+    whole = stitched(tmp_path, cuts(0.0, None, 12.0, 4.0, None), settings, path)
     files = {path.name for path in single.iterdir()} - {"summary.json", "tracks.parquet"}
     assert {path.name for path in whole.iterdir()} == {path.name for path in single.iterdir()}
     assert set(filecmp.cmpfiles(single, whole, files, shallow=False)[0]) == files

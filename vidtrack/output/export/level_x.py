@@ -45,10 +45,16 @@ def write(run: RoadRun, folder: Path) -> None:
     """Write 00_tracks.csv, 00_tracksMeta.csv and 00_recordingMeta.csv.
 
     A `trackId` is that of a piece: readers count on frames without a gap. What is not known is an empty cell, but for
-    class and size of a whole track. Raises ConfigError for a source without a frame rate.
+    class and size of a whole track. Raises ConfigError for a source without a frame rate, and for a run with rows
+    of some frames only.
     """
     if not run.fps:
         raise ConfigError(f"level-x needs a frame rate, and the source of {run.folder} has none")
+    if run.every_s:
+        raise ConfigError(
+            f"level-x has all frames, and {run.folder} has rows of one in {run.every_s:.3g} s: track without "
+            "source.max_fps and output.every_s"
+        )
     with (
         replacing(folder / "00_tracks.csv") as tracks_path,
         replacing(folder / "00_tracksMeta.csv") as meta_path,

@@ -8,12 +8,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.output.export.road_run import RoadRun, Rows
+
+_LATE = 1.25
+"""Pictures by which the next row may come later than the time between two rows; a quarter of it is jitter"""
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """The rows of a track in frames without a gap. `number`: of the track's pieces, from 1."""
+    """The rows of a track without a gap. `number`: of the track's pieces, from 1."""
 
     track: int
     number: int
@@ -39,23 +43,39 @@ def pieces(run: RoadRun) -> Iterator[Piece]:
         (kind,) = run.vehicles.kind[run.vehicles.row(np.array([track]))].tolist()
         return Piece(track, counts[track], kind, _joined(parts.pop(track)))
 
+    gap = _Gap(run.every_s and run.every_s + _LATE / (run.fps or np.inf))
     for rows in run.batches():
-        for part in _unbroken(rows):
+        for part in _unbroken(rows, gap):
             track = int(part.track[0])
-            if track in parts and parts[track][-1].frame[-1] + 1 < part.frame[0]:
+            if track in parts and gap.between(parts[track][-1], part.frame[0], part.time[0]):
                 yield ended(track)
             parts.setdefault(track, []).append(part)
-        open_from = rows.frame[-1] - 1  # the last frame may go on in the next batch
-        for track in [track for track, found in parts.items() if found[-1].frame[-1] < open_from]:
+        now = rows.frame[-1], rows.time[-1]  # the last frame may go on in the next batch
+        for track in [track for track, found in parts.items() if gap.between(found[-1], *now)]:
             yield ended(track)
     for track in list(parts):
         yield ended(track)
 
 
-def _unbroken(rows: Rows) -> Iterator[Rows]:
+@dataclass(frozen=True, slots=True)
+class _Gap:
+    """What counts as a gap: a missing frame, and where there are not rows of all, more than `longest_s` [s]."""
+
+    longest_s: float
+
+    def __call__(self, frames: Ints, seconds: Floats) -> Mask:
+        """Whether so many frames and seconds from one row to the next are a gap."""
+        return (frames > 1) & (seconds > self.longest_s)
+
+    def between(self, rows: Rows, frame: int, time_s: float) -> bool:
+        """Whether there is one between the last of the rows and a frame."""
+        return bool(self(frame - rows.frame[-1], time_s - rows.time[-1]))
+
+
+def _unbroken(rows: Rows, gap: _Gap) -> Iterator[Rows]:
     """The rows of each track, cut at gaps."""
     rows = rows.select(np.lexsort((rows.frame, rows.track)))
-    cut = (np.diff(rows.track) != 0) | (np.diff(rows.frame) != 1)
+    cut = (np.diff(rows.track) != 0) | gap(np.diff(rows.frame), np.diff(rows.time))
     ends = [0, *(np.flatnonzero(cut) + 1).tolist(), len(rows)]
     yield from (rows.select(slice(first, end)) for first, end in pairwise(ends))
 

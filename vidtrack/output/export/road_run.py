@@ -109,6 +109,7 @@ class RoadRun:
     """A finished run of a video at a calibrated site.
 
     fps         frames/s of the source; None where it says nothing
+    every_s     s; from one picture with rows to the next, where there are not rows of all; 0: there are
     corner      (2,) m; west and south of all positions
     extent      (2,) m; of all positions, to the east and to the north
     rows, positions   in the table of tracks, and those of them with a position
@@ -117,6 +118,7 @@ class RoadRun:
     folder: Path
     site: Site
     fps: float | None
+    every_s: float
     vehicles: Vehicles
     corner: Floats
     extent: Floats
@@ -180,9 +182,15 @@ def open_road_run(folder: Path, site: Path | None = None) -> RoadRun:
             f"{folder} has no positions in metres: no vehicle was found inside the points of the site's calibration"
         )
     vehicles = look.vehicles(whole)
-    return RoadRun(
-        folder, drawn, summary.get("fps"), vehicles, look.low, look.high - look.low, look.rows, look.positions
-    )
+    fps, size = summary.get("fps"), look.high - look.low
+    return RoadRun(folder, drawn, fps, _every_s(summary), vehicles, look.low, size, look.rows, look.positions)
+
+
+def _every_s(summary: dict[str, Any]) -> float:
+    """Time from one picture with rows to the next [s]; 0 if there are rows of all."""
+    settings, fps = summary.get("settings", {}), summary.get("fps") or np.inf
+    most = settings.get("source", {}).get("max_fps")
+    return float(max(1 / most if most and most < fps else 0.0, settings.get("output", {}).get("every_s") or 0.0))
 
 
 def _same_metres(one: Site, other: Site) -> bool:

@@ -13,6 +13,7 @@ from typing import Any
 from vidtrack.config.inputs import Input
 from vidtrack.config.load import load
 from vidtrack.config.settings import Settings
+from vidtrack.recording.source import is_recording
 from vidtrack.run.batch.batch import about
 from vidtrack.run.batch.index import Row
 from vidtrack.run.batch.sources import Source
@@ -42,7 +43,7 @@ class Plan:
         """A task for each source. Raises ConfigError for settings or a site that cannot be used."""
         loaded = cache(self._settings)
         for source in sources:
-            settings, digest = loaded(source.settings, source.site, source.address.lower().endswith(".txt"))
+            settings, digest = loaded(source.settings, source.site, _kind(source.address))
             site = settings["output"]["site"]
             start = None if source.start is None else source.start.isoformat()
             row = Row(source.shown, source.name, site, start, bytes=source.size, stamp=source.stamp)
@@ -53,10 +54,10 @@ class Plan:
                 self.slice_s, self.warm_s, self.patience_s,
             )  # fmt: skip
 
-    def _settings(self, more: tuple[str, ...], site: str | None, boxes: bool) -> tuple[dict[str, Any], str]:
+    def _settings(self, more: tuple[str, ...], site: str | None, kind: Input) -> tuple[dict[str, Any], str]:
         """The settings of a source, and a digest of them and of the content of its site and mask."""
         own = [*self.given, *more, *([("output.site", site)] if site is not None else [])]
-        settings = _at_root(load(self.config_file, own, kind=Input.DETECTIONS if boxes else Input.VIDEO))
+        settings = _at_root(load(self.config_file, own, kind=kind))
         if settings.output.site is not None:
             read_site(settings.output.site)  # refused before anything is begun
         files = (settings.output.site, settings.source.mask)
@@ -65,6 +66,13 @@ class Plan:
             sha256(path.read_bytes()).hexdigest() if path is not None and path.is_file() else "" for path in files
         ]
         return told, sha256(json.dumps([told, contents], sort_keys=True).encode()).hexdigest()
+
+
+def _kind(address: str) -> Input:
+    """The kind of a source, which may be far away."""
+    if address.lower().endswith(".txt"):
+        return Input.DETECTIONS
+    return Input.RECORDING if is_recording(address) else Input.VIDEO
 
 
 def _at_root(settings: Settings) -> Settings:

@@ -35,6 +35,7 @@ class About:
     stages   names of the stages that are timed
     columns  columns of position and of velocity in the state
     ends     time of the last step of each block [s]
+    before   number of the last frame before the slice, as it counts; None if it begins with its first frame
     """
 
     fps: float
@@ -45,6 +46,7 @@ class About:
     stages: tuple[str, ...] = ()
     columns: tuple[tuple[int, ...], tuple[int, ...]] = ((0, 2), (1, 3))
     ends: tuple[float, ...] = ()
+    before: int | None = None
 
 
 class KeptSteps:

@@ -41,13 +41,13 @@ class Seam:
 _NOBODY = np.empty(0, np.int64)
 
 
-def handed_on(last: Step, first: Step, fps: float | None) -> Seam:
+def handed_on(last: Step, first: Step, before: int | None) -> Seam:
     """The seam before the first step of a slice that goes on from the state after the last step of another one.
 
-    fps  nominal frames/s if there are pictures between the two, at which nobody looked; None: there are none
+    before  number of that last step's frame as the later slice counts; None: it begins with the next picture
     """
-    passed = 1 if fps is None else round((first.time_s - last.time_s) * fps)
-    return Seam(first.time_s, last.index + passed - first.index, None, _NOBODY, _NOBODY, same_ids=True)
+    shift = last.index - before if before is not None else last.index + 1 - first.index
+    return Seam(first.time_s, shift, None, _NOBODY, _NOBODY, same_ids=True)
 
 
 def seam(left: Sequence[Step], right: Sequence[Step], begin_s: float, fps: float) -> Seam:

@@ -70,7 +70,7 @@ def stitched_pipeline(
         name=Path(path).stem,
         place=Path(path),
         count=None,
-        steps=_counted(stitched(slices, all_looked_at=settings.source.max_fps is None), source.stats),
+        steps=_counted(stitched(slices), source.stats),
         summary=subject.summary,
         sinks=partial(
             file_sinks, subject, Extras(), motion=motion, hold_s=HOLD_S, smooth=bool(settings.output.smooth),
@@ -79,13 +79,10 @@ def stitched_pipeline(
     )  # fmt: skip
 
 
-def stitched(slices: Sequence[Slice], *, all_looked_at: bool = True) -> Iterator[Step]:
-    """The steps of all slices as of one run: frame numbers, ids and places go on over the seams.
-
-    all_looked_at  there is a step for each picture of the video
-    """
+def stitched(slices: Sequence[Slice]) -> Iterator[Step]:
+    """The steps of all slices as of one run: frame numbers, ids and places go on over the seams."""
     naming, told = _Naming(), set[str]()
-    seams = [_seam_of(*pair, all_looked_at) for pair in pairwise(slices)]
+    seams = [_seam_of(*pair) for pair in pairwise(slices)]
     ends = [*(each.time_s for each in seams), np.inf]
     begin_s = -np.inf
     for slice, end_s, joint in zip(slices, ends, [None, *seams], strict=True):
@@ -98,11 +95,11 @@ def stitched(slices: Sequence[Slice], *, all_looked_at: bool = True) -> Iterator
         begin_s = end_s
 
 
-def _seam_of(left: Slice, right: Slice, all_looked_at: bool) -> Seam:
+def _seam_of(left: Slice, right: Slice) -> Seam:
     """The seam between neighbours, by their steps around the cut."""
     if right.cut.goes_on:
         *_, last = left.steps(left.about.ends[-1], np.inf)
-        return handed_on(last, next(right.steps(-np.inf, np.inf)), None if all_looked_at else left.about.fps)
+        return handed_on(last, next(right.steps(-np.inf, np.inf)), right.about.before)
     begin_s = right.cut.begin_s
     window = begin_s - OVERLAP_S, begin_s + OVERLAP_S
     return seam(list(left.steps(*window)), list(right.steps(*window)), begin_s, left.about.fps)

@@ -78,4 +78,5 @@ def track_slice(
                 np.save(folder / SCENE, detector.scene())
             if cut.warm_s is None and cut.end_s is not None:
                 write_state(folder / STATE, gather(both))
-        kept.about(About(source.fps, *size, asdict(source.stats), tracker.rates.as_dict()))
+        stats, rates = asdict(source.stats), tracker.rates.as_dict()
+        kept.about(About(source.fps, *size, stats, rates, before=source.before))

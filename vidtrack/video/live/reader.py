@@ -51,7 +51,7 @@ class Reader:
 
     connect  opens a Connection
     shots    queue for pictures; closed with an error if the source cannot be opened at the start
-    max_fps  pictures between so many a second are not delivered, and decoded only if others need them; None: all are
+    max_fps  no more than so many pictures a second are delivered; None: all
     alive_s  monotonic time of the thread's last activity
     """
 
@@ -72,7 +72,6 @@ class Reader:
         self._backoff = Backoff(settings.backoff_s, settings.backoff_longest_s, Random())
         self._recorder = recorder
         self._clock = clock
-        self._max_fps = max_fps
         self._rate = MaxRate(max_fps)
         self._stopping = Event()
         self._failures = 0  # since the last picture
@@ -130,7 +129,6 @@ class Reader:
         try:
             self._connections += 1
             self._clock.reconnected()
-            self._rate = MaxRate(self._max_fps)
             self._read_packets(connection)
         finally:
             self._recorder.end_part()
@@ -160,6 +158,7 @@ class Reader:
             if pictures:
                 pictured_s = now_s
             elif unwanted:
+                pictured_s = now_s
                 self._stats.arrived(now_s)
             elif now_s - pictured_s > self._settings.timeout_s:
                 raise Stalled(f"no picture could be decoded for {self._settings.timeout_s:g} s; is the stream damaged?")

@@ -16,7 +16,7 @@ _RATE_S = 10.0
 class LiveStats(SourceStats):
     """Counters and state of a camera.
 
-    received    pictures received: read, dropped, or between those that were wanted
+    received    pictures received: read, dropped, or left out for `max_fps`
     reconnects  connections after the first
     stalls      time-outs of an open connection
     state       "connecting", "running", "waiting" (before another attempt) or "ended"
