@@ -6,13 +6,17 @@ import cv2
 import numpy as np
 import pytest
 from cameras import Picture, Script, crossing, script_of
+from click.testing import CliRunner
 from live_runs import frames, play, rows, run_until, settings
 
+from vidtrack.cli import cli
 from vidtrack.config.load import load
-from vidtrack.errors import FormatError, OutputError, SourceError
+from vidtrack.errors import ConfigError, FormatError, OutputError, SourceError
 from vidtrack.output.repair import read_tracks
 from vidtrack.recording.retention import parts_of
 from vidtrack.recording.source import is_recording, recorded_settings
+from vidtrack.run.batch.plan import Plan
+from vidtrack.run.batch.sources import listed
 from vidtrack.run.files import run_file
 from vidtrack.run.live.checkpoint import CheckpointFile
 from vidtrack.run.live.outputs import LiveExtras
@@ -67,6 +71,18 @@ def test_a_recording_gives_the_same_tracks(camera, tmp_path, path, max_fps):
     output = recorded.output.model_copy(update={"site": chosen.output.site})
     assert recorded.model_copy(update={"output": output}) == chosen
     assert replay(tmp_path / "tape", tmp_path / "again", recorded) == lived
+
+
+@pytest.mark.parametrize("command", ["track", "doctor"])
+def test_nothing_is_asked_of_a_recording_that_it_cannot_follow(camera, tmp_path, command):
+    tape, said = tmp_path / "tape", "source.max_fps has no effect on a recording of a live run"
+    with LiveRun(camera.url(), settings(), tmp_path / "out", LiveExtras(record=tape)) as run:
+        run_until(run, frames(2))
+    with pytest.raises(ConfigError, match=said):
+        CliRunner().invoke(cli, [command, str(tape), "--max-fps", "5"], standalone_mode=False, catch_exceptions=False)
+    plan = Plan(str(tmp_path / "batch"), None, ("source.max_fps=5",), 0.0, None, 60.0)
+    with pytest.raises(ConfigError, match=said):
+        list(plan.tasks(listed([str(tape)])))
 
 
 def test_parts_cut_from_one_connection_do_too(camera, tmp_path):
