@@ -24,17 +24,12 @@ def read(path, opened=open_source, **settings):
 
 
 @pytest.mark.parametrize(
-    ("fps", "most", "expected"),
-    [
-        (25, 12.5, [0, 2, 4, 6, 8, 10]),
-        (25, 10, [0, 3, 5, 8, 10]),
-        (25, 25, list(range(12))),
-        (10, 25, list(range(12))),
-        (30, None, list(range(12))),
-    ],
+    ("fps", "most", "expected"), [(25, 12.5, 12.5), (25, 10, 25 / 3), (30, 29, 15), (25, 25, 25), (10, 25, 10)]
 )
-def test_pictures_are_chosen_as_evenly_as_they_come(fps, most, expected):
-    assert chosen(np.arange(12) / fps, most, fps) == expected
+def test_every_nth_picture_of_a_known_rate_is_looked_at(fps, most, expected):
+    looked_at = SourceSettings(max_fps=most).looked_at_fps(fps)
+    assert looked_at == pytest.approx(expected)
+    assert chosen(np.arange(30) / fps, looked_at, fps, 0.0) == list(range(0, 30, round(fps / looked_at)))
 
 
 @pytest.mark.parametrize("ratio", range(1, 9))
@@ -68,9 +63,9 @@ def test_there_are_no_more_and_a_slow_source_loses_none(steps, most):
 def test_frames_of_a_file_keep_numbers_and_times(tmp_path, name, codec, pixels):
     path = write_clip(tmp_path / name, 40, codec, pixels)
     frames, source = read(path, max_fps=10)
-    assert frames == [(k, k / 25) for k in (0, 3, 5, 8, 10, 13, 15, 18, 20, 23, 25, 28, 30, 33, 35, 38)]
-    assert (source.fps, source.frames, source.stats.frames_read) == (25, 16, 16)
-    assert read(path, max_fps=10, start_s=0.15, end_s=0.5)[0] == [(5, 0.2), (8, 0.32), (10, 0.4)]
+    assert frames == [(k, k / 25) for k in range(0, 40, 3)]
+    assert (source.fps, source.frames, source.stats.frames_read) == (25, 14, 14)
+    assert read(path, max_fps=10, start_s=0.15, end_s=0.5)[0] == [(6, 0.24), (9, 0.36), (12, 0.48)]
 
 
 def test_images_between_are_not_read(tmp_path):

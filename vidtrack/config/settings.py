@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from pydantic import Field, ValidationInfo, field_validator
@@ -25,7 +26,7 @@ class SourceSettings(Group):
     fps: float | None = Field(None, gt=0, le=1000)
     """frames/s if the input has no times or wrong ones; None: from the video or seqinfo.ini, else 25"""
     max_fps: float | None = Field(None, ge=1, le=1000)
-    """frames/s; no more than so many are looked at, evenly spaced; None: all"""
+    """frames/s; every 2nd, 3rd, ... picture is looked at, so that there are no more than this; None: all"""
     scale: float | None = Field(None, gt=0, le=1)
     """processed over source size, rounded to 1, 1/2, 1/3, ...; None: the largest of these with at most 500 rows"""
     mask: Path | None = None
@@ -35,7 +36,7 @@ class SourceSettings(Group):
 
     def looked_at_fps(self, fps: float) -> float:
         """Frames/s that are looked at of a source with `fps`."""
-        return fps if self.max_fps is None else min(fps, self.max_fps)
+        return fps if self.max_fps is None else fps / max(1, math.ceil(fps / self.max_fps - 1e-6))
 
     @field_validator("end_s")
     @classmethod

@@ -138,7 +138,7 @@ def _on_gaps(timing: Timing, settings: Settings) -> Iterator[Advice]:
 
 def _on_speed(findings: Findings, speed: Speed, settings: Settings) -> Iterator[Advice]:
     coming = findings.timing.rate if findings.timing else findings.fps
-    needed = settings.source.looked_at_fps(coming)
+    needed = min(coming, settings.source.max_fps or math.inf)
     decoding = coming * (speed.decode_s or 0.0)
     busy = decoding + needed * speed.track_s
     if busy < _RESERVE:

@@ -156,12 +156,12 @@ class VideoFile:
         return next((self._stamp(picture) for picture in self._decoded()), None) or 0
 
     def _max_rate(self) -> MaxRate:
-        return MaxRate(self._settings.max_fps, self.fps, since_s=0.0)
+        return MaxRate(self._settings.looked_at_fps(self.fps), self.fps, since_s=0.0)
 
     @property
     def _interval_s(self) -> float:
         """Time in which one picture is looked at; 0 if all are."""
-        return 0.0 if self._settings.max_fps is None else 1 / self._settings.max_fps
+        return 0.0 if self._settings.max_fps is None else 1 / self._settings.looked_at_fps(self.fps)
 
     def close(self) -> None:
         """Close the file; not while another thread iterates."""

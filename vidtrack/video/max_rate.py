@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from math import floor, inf
 
-_EARLY, _EARLY_PICTURE = 0.25, 0.4
-"""A picture may come before its interval by these shares of the interval and of the time from picture to picture, the
-lesser of both: stamps are rounded, and cameras jitter"""
+_EARLY = 0.4
+"""Time from picture to picture by which one may come before its interval: stamps are rounded, and cameras jitter"""
+_EARLY_AT_ANY_RATE = 0.25
+"""The same in intervals, where the source's rate is not known for sure"""
 
 
 class MaxRate:
     """Chooses the first picture in each of equal intervals of time, so that there are no more than `most` a second.
 
     most     frames/s; None: all pictures are chosen
-    fps      nominal frames/s of the source; all are chosen if these are no more than `most`; None: not known for sure
+    fps      nominal frames/s of the source, of which `most` is a whole part; None: not known for sure
     since_s  begin of an interval [s]; None: the time of the first picture
 
     With `since_s`, readings of a video from different places agree one interval after they begin.
     """
 
     def __init__(self, most: float | None, fps: float | None = None, since_s: float | None = None) -> None:
-        self._most = None if most is None or (fps is not None and fps <= most) else most
-        self._early = _EARLY if fps is None or most is None else min(_EARLY, _EARLY_PICTURE * most / fps)
+        self._most = None if most == fps else most
+        self._early = _EARLY_AT_ANY_RATE if fps is None or most is None else _EARLY * most / fps
         self._since_s = since_s
         self._last = -inf
 

@@ -41,7 +41,7 @@ class ImageSequence:
     def __init__(self, paths: Iterable[Path], settings: SourceSettings, stats: SourceStats) -> None:
         self._paths = sorted(paths, key=_natural)
         self._stats = stats
-        self._max_fps = settings.max_fps
+        self._settings = settings
         self.place = self._paths[0].parent
         info = read_sequence_info(self.place)
         self.name = info.name or _name(self.place.resolve())
@@ -69,7 +69,7 @@ class ImageSequence:
                 self._stats.count_error(str(error))
 
     def _looked_at(self) -> Iterator[int]:
-        rate = MaxRate(self._max_fps, self.fps, since_s=0.0)
+        rate = MaxRate(self._settings.looked_at_fps(self.fps), self.fps, since_s=0.0)
         return (index for index in range(len(self._paths)) if rate.chooses(index / self.fps))
 
     def close(self) -> None:

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from itertools import chain
+from math import ceil
 from pathlib import Path
 from types import TracebackType
 
@@ -188,7 +189,7 @@ class Source:
 
     def _expected(self, pictures: int) -> int:
         """How many frames come of so many pictures in the input."""
-        return round(len(self._span.frames(self.fps, pictures)) * self._looked_at_fps / self.fps)
+        return ceil(len(self._span.frames(self.fps, pictures)) * self._looked_at_fps / self.fps - 1e-6)
 
     def _in_span(self, frames: Iterator[Frame]) -> Iterator[Frame]:
         empty = True

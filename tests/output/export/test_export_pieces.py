@@ -58,12 +58,12 @@ def test_a_guess_that_was_confirmed_stays_and_the_last_one_goes(tmp_path):
 @pytest.mark.parametrize("batch", [3, 1 << 16])
 def test_frames_that_nobody_looked_at_are_no_gap(tmp_path, monkeypatch, batch):
     monkeypatch.setattr(road_run, "_BATCH", batch)
-    looked_at = [0, 2, 5, 7, 10, 12, 15, 20, 22]  # ten of 25 a second; the vehicle is missing at 17
+    looked_at = [0, 3, 6, 9, 12, 15, 21, 24]  # the vehicle is missing at 18
     found = list(pieces(open_road_run(write_run(tmp_path, way(1, looked_at), max_fps=10))))
-    assert [piece.rows.frame.tolist() for piece in found] == [looked_at[:7], looked_at[7:]]
+    assert [piece.rows.frame.tolist() for piece in found] == [looked_at[:6], looked_at[6:]]
 
 
 def test_level_x_which_has_all_frames_refuses_a_run_that_has_not(tmp_path):
-    run = open_road_run(write_run(tmp_path, way(1, [0, 2, 5, 7]), max_fps=10))
-    with pytest.raises(ConfigError, match=r"rows of one in 0\.1 s: track without source\.max_fps"):
+    run = open_road_run(write_run(tmp_path, way(1, [0, 3, 6, 9]), max_fps=10))
+    with pytest.raises(ConfigError, match=r"rows of one in 0\.12 s: track without source\.max_fps"):
         level_x.write(run, tmp_path)

@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.formats import damaged
 from vidtrack.output.export.whole_tracks import WholeTracks
@@ -188,9 +189,10 @@ def open_road_run(folder: Path, site: Path | None = None) -> RoadRun:
 
 def _every_s(summary: dict[str, Any]) -> float:
     """Time from one picture with rows to the next [s]; 0 if there are rows of all."""
-    settings, fps = summary.get("settings", {}), summary.get("fps") or np.inf
-    most = settings.get("source", {}).get("max_fps")
-    return float(max(1 / most if most and most < fps else 0.0, settings.get("output", {}).get("every_s") or 0.0))
+    settings, fps = summary.get("settings", {}), summary.get("fps") or 0.0
+    source = SourceSettings(max_fps=settings.get("source", {}).get("max_fps"))
+    looked_at_fps = source.looked_at_fps(fps)
+    return float(max(1 / looked_at_fps if looked_at_fps < fps else 0.0, settings.get("output", {}).get("every_s") or 0))
 
 
 def _same_metres(one: Site, other: Site) -> bool:
