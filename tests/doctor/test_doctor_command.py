@@ -123,5 +123,6 @@ def test_a_machine_that_is_too_slow(rate, decode_s, track_s, options):
 def test_fewer_pictures_a_second_are_advised_once_and_not_of_a_recording():
     settings = load(assignments=["source.max_fps=16"])
     assert list(judge(found_at(25.0, 0.010, 0.032), settings)) == []  # the time of a picture is never quite the same
+    assert list(judge(found_at(25.0, None, 0.045), load(assignments=["source.max_fps=16"]))) == []
     (advice,) = judge(found_at(25.0, 0.010, 0.030, "recording"), load())
     assert advice.options == ("--scale 0.5",)

@@ -24,7 +24,8 @@ def read(path, opened=open_source, **settings):
 
 
 @pytest.mark.parametrize(
-    ("fps", "most", "expected"), [(25, 12.5, 12.5), (25, 10, 25 / 3), (30, 29, 15), (25, 25, 25), (10, 25, 10)]
+    ("fps", "most", "expected"),
+    [(25, 12.5, 12.5), (25, 10, 25 / 3), (30, 29, 15), (25, 25, 25), (10, 25, 10), (30.02, 15, 15.01)],
 )
 def test_every_nth_picture_of_a_known_rate_is_looked_at(fps, most, expected):
     looked_at = SourceSettings(max_fps=most).looked_at_fps(fps)

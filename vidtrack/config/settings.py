@@ -17,6 +17,8 @@ from vidtrack.config.names import Decoder, Distance, Level, Life, Method
 from vidtrack.config.radar import RadarSettings
 from vidtrack.config.video import BlobSettings, DetectorSettings
 
+_ROUNDING = 0.02  # 30.02 frames/s of a phone are 30: a greater max_fps is not asked of the user
+
 
 class SourceSettings(Group):
     start_s: float = Field(0.0, ge=0)
@@ -26,7 +28,7 @@ class SourceSettings(Group):
     fps: float | None = Field(None, gt=0, le=1000)
     """frames/s if the input has no times or wrong ones; None: from the video or seqinfo.ini, else 25"""
     max_fps: float | None = Field(None, ge=1, le=1000)
-    """frames/s; every 2nd, 3rd, ... picture is looked at, so that there are no more than this; None: all"""
+    """frames/s; every 2nd, 3rd, ... picture of a file is looked at, of a camera so many; None: all"""
     scale: float | None = Field(None, gt=0, le=1)
     """processed over source size, rounded to 1, 1/2, 1/3, ...; None: the largest of these with at most 500 rows"""
     mask: Path | None = None
@@ -36,7 +38,7 @@ class SourceSettings(Group):
 
     def looked_at_fps(self, fps: float) -> float:
         """Frames/s that are looked at of a source with `fps`."""
-        return fps if self.max_fps is None else fps / max(1, math.ceil(fps / self.max_fps - 1e-6))
+        return fps if self.max_fps is None else fps / max(1, math.ceil(fps / self.max_fps - _ROUNDING))
 
     @field_validator("end_s")
     @classmethod

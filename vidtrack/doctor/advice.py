@@ -138,14 +138,13 @@ def _on_gaps(timing: Timing, settings: Settings) -> Iterator[Advice]:
 
 def _on_speed(findings: Findings, speed: Speed, settings: Settings) -> Iterator[Advice]:
     coming = findings.timing.rate if findings.timing else findings.fps
-    needed = min(coming, settings.source.max_fps or math.inf)
+    live = findings.kind == "live"
+    needed = min(coming, settings.source.max_fps or math.inf) if live else settings.source.looked_at_fps(coming)
     decoding = coming * (speed.decode_s or 0.0)
     busy = decoding + needed * speed.track_s
     if busy < _RESERVE:
         return
-    then = (
-        "frames will be dropped" if findings.kind == "live" else "a file takes longer than it plays, live it would drop"
-    )
+    then = "frames will be dropped" if live else "a file takes longer than it plays, live it would drop"
     text = f"{needed:.3g} frames/s keep this machine busy for {busy:.0%} of the time: {then}"
     left = _RESERVE - decoding
     if left <= 0:

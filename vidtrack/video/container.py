@@ -91,9 +91,11 @@ class VideoFile:
         Where pictures have no stamps, or the place in the file is not found, the file is read from its beginning.
         Iterate over the whole file or over spans, not both.
         """
-        near = self._after_key_frame(max(0.0, begin_s - self._interval_s), end_s, every_s)
+        from_s = max(0.0, begin_s - self._interval_s)
+        latest_s = begin_s + 1 / self.fps if self._settings.max_fps is None else from_s + ROUNDING_S
+        near = self._after_key_frame(from_s, end_s, every_s)
         first = next(near, None)
-        if first is None or first[0] > begin_s + 1 / self.fps:
+        if first is None or first[0] > latest_s:
             again = VideoFile(self._path, self._settings, SourceStats(told=True))
             near = ((time_s, picture) for _, time_s, picture in again)
         else:

@@ -69,14 +69,14 @@ def table_of(*ways, columns=COLUMNS):
     )
 
 
-def write_run(folder, *ways, site=SITE, columns=COLUMNS, fps=FPS, max_fps=None):
+def write_run(folder, *ways, site=SITE, columns=COLUMNS, fps=FPS, max_fps=None, every_s=0.0, **told):
     """A finished run; returns its folder."""
     run = folder / "run"
     run.mkdir(parents=True)
     (folder / "site.toml").write_text(site)
     pq.write_table(table_of(*ways, columns=columns), run / "tracks.parquet")
-    settings = {"output": {"site": str(folder / "site.toml")}, "source": {"max_fps": max_fps}}
-    summary = {"fps": fps, "settings": settings}
+    settings = {"output": {"site": str(folder / "site.toml"), "every_s": every_s}, "source": {"max_fps": max_fps}}
+    summary = {"fps": fps, "settings": settings, **told}
     (run / "summary.json").write_text(json.dumps(summary))
     return run
 

@@ -63,6 +63,21 @@ def test_frames_that_nobody_looked_at_are_no_gap(tmp_path, monkeypatch, batch):
     assert [piece.rows.frame.tolist() for piece in found] == [looked_at[:6], looked_at[6:]]
 
 
+@pytest.mark.parametrize(
+    ("frames", "told"),
+    [
+        ([0, 15, 30, 45, 75], {"max_fps": 5, "every_s": 0.5}),  # every third of the five a second
+        ([0, 13, 26, 39, 65], {"every_s": 0.5}),
+        ([0, 1, 2, 3, 5], {"max_fps": 12, "began": "2026-06-01T07:00:00Z"}),  # a camera's, numbered as they are tracked
+    ],
+)
+def test_one_row_that_is_missing_is_a_gap_whatever_is_left_out(tmp_path, frames, told):
+    rows = way(1, frames)
+    rows["time_s"] = rows["time_s"] * (2 if "began" in told else 1)
+    found = list(pieces(open_road_run(write_run(tmp_path, rows, **told))))
+    assert [piece.rows.frame.tolist() for piece in found] == [frames[:4], frames[4:]]
+
+
 def test_level_x_which_has_all_frames_refuses_a_run_that_has_not(tmp_path):
     run = open_road_run(write_run(tmp_path, way(1, [0, 3, 6, 9]), max_fps=10))
     with pytest.raises(ConfigError, match=r"rows of one in 0\.12 s: track without source\.max_fps"):

@@ -72,6 +72,29 @@ def test_a_slow_tracker_gets_the_newest_frames_and_is_never_late():
     assert stats.frames_dropped > 50
 
 
+def test_a_camera_of_just_the_largest_rate_loses_hardly_any_by_jitter():
+    """By intervals of time alone it would lose one in ten."""
+    waits = np.random.default_rng(0).uniform(0.012, 0.028, 200)
+    acts = [act for wait in waits for act in (wait, Picture(grey(30)))]
+    with open_script(Script(*acts, SILENT), settings=EVERY, max_fps=50.0) as source:
+        assert len(take(source, 190)) == 190
+
+
+def test_a_damaged_camera_stalls_also_where_few_pictures_are_decoded(monkeypatch):
+    script = Script(*pictures(range(10, 250), 0.01), SILENT)
+
+    def damaged_later(packet):
+        if packet.image[0, 0] > 40:
+            raise av.error.InvalidDataError(1, "damaged")
+        return Script.decode(script, packet)
+
+    monkeypatch.setattr(script, "is_intra", True, raising=False)
+    monkeypatch.setattr(script, "decode", damaged_later)
+    impatient = EVERY.model_copy(update={"timeout_s": 0.3})
+    with open_script(script, settings=impatient, max_fps=20.0) as source:
+        wait_for(lambda: source.stats.stalls == 1)
+
+
 @pytest.mark.parametrize("is_intra", [False, True])
 def test_pictures_beyond_the_rate_do_not_come_and_are_not_dropped(monkeypatch, is_intra):
     """Whole compressed pictures are not even decoded."""

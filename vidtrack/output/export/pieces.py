@@ -11,8 +11,8 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.output.export.road_run import RoadRun, Rows
 
-_LATE = 1.25
-"""Pictures by which the next row may come later than the time between two rows; a quarter of it is jitter"""
+_LATEST = 1.75
+"""Times between two rows after which the next one may come: not two, where one is missing"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ def pieces(run: RoadRun) -> Iterator[Piece]:
         (kind,) = run.vehicles.kind[run.vehicles.row(np.array([track]))].tolist()
         return Piece(track, counts[track], kind, _joined(parts.pop(track)))
 
-    gap = _Gap(run.every_s and run.every_s + _LATE / (run.fps or np.inf))
+    gap = _Gap(_LATEST * run.every_s)
     for rows in run.batches():
         for part in _unbroken(rows, gap):
             track = int(part.track[0])

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -190,9 +191,14 @@ def open_road_run(folder: Path, site: Path | None = None) -> RoadRun:
 def _every_s(summary: dict[str, Any]) -> float:
     """Time from one picture with rows to the next [s]; 0 if there are rows of all."""
     settings, fps = summary.get("settings", {}), summary.get("fps") or 0.0
+    every_s = settings.get("output", {}).get("every_s") or 0.0
+    if not fps:
+        return float(every_s)
     source = SourceSettings(max_fps=settings.get("source", {}).get("max_fps"))
-    looked_at_fps = source.looked_at_fps(fps)
-    return float(max(1 / looked_at_fps if looked_at_fps < fps else 0.0, settings.get("output", {}).get("every_s") or 0))
+    of_a_camera = "began" in summary
+    looked_at = min(fps, source.max_fps or fps) if of_a_camera else source.looked_at_fps(fps)
+    steps = max(1, ceil(every_s * looked_at - 1e-6))
+    return float(steps / looked_at) if steps > 1 or looked_at < fps else 0.0
 
 
 def _same_metres(one: Site, other: Site) -> bool:

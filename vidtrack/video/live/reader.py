@@ -29,6 +29,7 @@ log = logging.getLogger(__name__)
 
 _TRIES = 3
 _EDGE_S = 0.003  # a packet after a longer wait has just arrived
+_HARDLY_MORE = 1.05  # of the largest rate; to leave out of 25 that jitter what is beyond 25 would only tear gaps
 _BEHIND_S = 1.0  # without such a packet for longer, decoding is too slow and skips to the next key picture
 
 
@@ -72,7 +73,9 @@ class Reader:
         self._backoff = Backoff(settings.backoff_s, settings.backoff_longest_s, Random())
         self._recorder = recorder
         self._clock = clock
+        self._max_fps = max_fps
         self._rate = MaxRate(max_fps)
+        self._blind_s = settings.timeout_s if max_fps is None else max(settings.timeout_s, 2 / max_fps)
         self._stopping = Event()
         self._failures = 0  # since the last picture
         self._reason = ""  # of the last failure
@@ -151,16 +154,15 @@ class Reader:
             if self._recorder.cut(connection, packet):
                 self._deliver(connection, connection.start_decoder_anew(), now_s)
             packet.opaque = self._recorder.place()
-            unwanted = live and connection.is_intra and not self._rate.chooses(now_s)
+            unwanted = live and connection.is_intra and not self._wanted(now_s, now_s)
             pictures = [] if skipping or unwanted else self._decoded(connection, packet)
             self._recorder.take(packet, pictures, now_s)
             self._stats.frames_dropped += skipping
             if pictures:
                 pictured_s = now_s
             elif unwanted:
-                pictured_s = now_s
-                self._stats.arrived(now_s)
-            elif now_s - pictured_s > self._settings.timeout_s:
+                self._stats.left_out(now_s)
+            elif now_s - pictured_s > self._blind_s:
                 raise Stalled(f"no picture could be decoded for {self._settings.timeout_s:g} s; is the stream damaged?")
             if live:
                 self._deliver(connection, pictures, now_s)
@@ -184,12 +186,17 @@ class Reader:
             self._report_stream(connection, picture)
             time_s = self._clock.time_s(connection.stamp_s(picture), now_s)
             self._stats.arrived(now_s)
-            if not (connection.is_intra or self._rate.chooses(time_s)):
+            if not (connection.is_intra or self._wanted(time_s, now_s)):
                 continue
             place: Any = picture.opaque or self._recorder.place()
             shot = Shot(to_frame(0, time_s, picture), connection.fps, place)
             if not self._stopping.is_set():
                 self._stats.frames_dropped += self._shots.put(shot)
+
+    def _wanted(self, time_s: float, now_s: float) -> bool:
+        """Whether a picture of this time is looked at: all are if hardly more come lately than are wanted."""
+        chosen = self._rate.chooses(time_s)
+        return chosen or (self._max_fps is not None and 0 < self._stats.rate(now_s) <= _HARDLY_MORE * self._max_fps)
 
     def _report_stream(self, connection: Connection, picture: av.VideoFrame) -> None:
         """Report changes of the stream when pictures arrive again."""

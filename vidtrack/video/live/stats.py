@@ -44,6 +44,11 @@ class LiveStats(SourceStats):
         self.received += 1
         self._arrivals.append(now_s)
 
+    def left_out(self, now_s: float) -> None:
+        """Count a picture that nobody decodes; before the first one that was, nobody knows that it is one."""
+        if self.received:
+            self.arrived(now_s)
+
     def rate(self, now_s: float) -> float:
         """Pictures per second in the last seconds; 0 while none arrive."""
         times = [time_s for time_s in list(self._arrivals) if now_s - time_s < _RATE_S]
