@@ -47,18 +47,17 @@ def command(options: TrackOptions) -> None:
     tracks.png. Ctrl-C ends with complete results up to then.
     """
     from vidtrack.config.inputs import Input
-    from vidtrack.detections.stored import is_detections
-    from vidtrack.recording.source import is_recording, recorded_settings
+    from vidtrack.recording.source import recorded_settings
     from vidtrack.rehearsal import rehearse_beside
     from vidtrack.run.boxes import first_boxes
-    from vidtrack.run.files import run_file
+    from vidtrack.run.files import kind_of_file, run_file
     from vidtrack.run.run import Extras
 
     start_log(options.verbose, options.quiet)
     source = options.source
-    stored, recorded = is_detections(source), is_recording(source)
-    kind = Input.DETECTIONS if stored else Input.RECORDING if recorded else Input.VIDEO
-    settings = options.settings(kind, recorded_settings(source) if recorded else None)
+    kind = kind_of_file(source)
+    stored = kind is Input.DETECTIONS
+    settings = options.settings(kind, recorded_settings(source) if kind is Input.RECORDING else None)
     announce_compiling(options.quiet, video=not stored)
     if stored:
         rehearse_beside(first_boxes, source, settings)

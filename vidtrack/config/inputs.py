@@ -34,17 +34,18 @@ _OF_PICTURES = (
     *("tracker.blob_overlap", "tracker.merged_blobs", "tracker.group_cover", "tracker.hidden_s", "tracker.parts"),
     *("source.max_fps", "source.scale", "source.mask", "source.decoder", "output.video_crf", "output.jpeg_quality"),
 )
+_OF_THE_PREVIEW = ("detector.disturbance.preview_s", "detector.disturbance.patches")
 _OF_OTHER_INPUT = ("detections", "radar", "live", "events", "tracker.redundant")
 _UNREAD = {
     Input.VIDEO: _OF_OTHER_INPUT,
     Input.RECORDING: (
         *_OF_OTHER_INPUT,
         *(f"source.{name}" for name in ("start_s", "end_s", "fps", "max_fps", "decoder")),
-        *("detector.disturbance.preview_s", "detector.disturbance.patches"),
+        *_OF_THE_PREVIEW,
     ),
     Input.CAMERA: (
         *("detections", "radar", "tracker.redundant"),
-        *("detector.disturbance.preview_s", "detector.disturbance.patches"),
+        *_OF_THE_PREVIEW,
         *("output.smooth", "output.smooth_lag_s"),
     ),
     Input.DETECTIONS: (

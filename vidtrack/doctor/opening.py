@@ -8,8 +8,8 @@ from time import monotonic
 
 from vidtrack.config.inputs import Input
 from vidtrack.config.settings import Settings
-from vidtrack.detections.stored import is_detections
 from vidtrack.recording.source import Recording, is_recording
+from vidtrack.run.files import kind_of_file
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.connection import connection_to
@@ -24,11 +24,7 @@ def is_live(source: str) -> bool:
 
 def kind_of(source: str) -> Input:
     """The kind of the source."""
-    if is_detections(source):
-        return Input.DETECTIONS
-    if is_recording(source):
-        return Input.RECORDING
-    return Input.CAMERA if is_live(source) else Input.VIDEO
+    return Input.CAMERA if is_live(source) else kind_of_file(source)
 
 
 def open_pictures(source: str, settings: Settings) -> Source | LiveSource | Recording:

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from vidtrack.config.inputs import Input
 from vidtrack.config.settings import Settings
 from vidtrack.detections.stored import is_detections
+from vidtrack.recording.source import is_recording
 from vidtrack.run.boxes import box_pipeline
 from vidtrack.run.run import Extras, Run
 from vidtrack.run.video import video_pipeline
+
+
+def kind_of_file(source: str) -> Input:
+    """The kind of a source that is no camera."""
+    if is_detections(source):
+        return Input.DETECTIONS
+    return Input.RECORDING if is_recording(source) else Input.VIDEO
 
 
 def run_file(

@@ -31,8 +31,8 @@ class VideoFile:
     from_s  s; begin with the key picture before this time, and number the pictures from there
 
     name, place, fps, frames as for Source. No more than `max_fps` a second come, with the numbers and times that they
-    have among all. Damage is counted in `stats`, and reading continues with the next picture
-    that can be decoded. Raises SourceError for a file that is not a readable video.
+    have among all. Damage is counted in `stats`, and reading continues with the next picture that can be decoded.
+    Raises SourceError for a file that is not a readable video.
     """
 
     def __init__(self, path: Path, settings: SourceSettings, stats: SourceStats, from_s: float = 0.0) -> None:
@@ -87,9 +87,8 @@ class VideoFile:
         """(time, picture) of a span of time, decoded from the key frame before it; spans in any order.
 
         Only pictures that lie `every_s` apart are needed; those between them are left out where that saves decoding,
-        but not with `max_fps`, with which there are few.
-        Where pictures have no stamps, or the place in the file is not found, the file is read from its beginning.
-        Iterate over the whole file or over spans, not both.
+        but not with `max_fps`, with which there are few. Where pictures have no stamps, or the place in the file is not
+        found, the file is read from its beginning. Iterate over the whole file or over spans, not both.
         """
         from_s = max(0.0, begin_s - self._interval_s)
         latest_s = begin_s + 1 / self.fps if self._settings.max_fps is None else from_s + ROUNDING_S

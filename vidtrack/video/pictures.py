@@ -13,7 +13,6 @@ import av
 
 from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
-from vidtrack.video.max_rate import MaxRate
 from vidtrack.video.sequence import read_sequence_info, untimed_rate
 from vidtrack.video.stats import SourceStats
 
@@ -41,15 +40,15 @@ class ImageSequence:
     def __init__(self, paths: Iterable[Path], settings: SourceSettings, stats: SourceStats) -> None:
         self._paths = sorted(paths, key=_natural)
         self._stats = stats
-        self._settings = settings
         self.place = self._paths[0].parent
         info = read_sequence_info(self.place)
         self.name = info.name or _name(self.place.resolve())
         self.fps = untimed_rate(info, settings, stats)
+        self._every = round(self.fps / settings.looked_at_fps(self.fps))
         self.frames = len(self._paths)
 
     def __iter__(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
-        for index in self._looked_at():
+        for index in range(0, len(self._paths), self._every):
             try:
                 picture = _read(self._paths[index])
             except SourceError as error:
@@ -60,17 +59,12 @@ class ImageSequence:
     def between(self, begin_s: float, end_s: float, every_s: float = 0.0) -> Iterator[tuple[float, av.VideoFrame]]:
         """(time, picture) of a span of time; also those less than `every_s` apart."""
         first, last = ceil(begin_s * self.fps - 1e-6), floor(end_s * self.fps + 1e-6)
-        for index in self._looked_at():
-            if not first <= index <= last:
-                continue
+        looked_at = range(0, min(last + 1, len(self._paths)), self._every)
+        for index in looked_at[ceil(max(first, 0) / self._every) :]:
             try:
                 yield index / self.fps, _read(self._paths[index])
             except SourceError as error:
                 self._stats.count_error(str(error))
-
-    def _looked_at(self) -> Iterator[int]:
-        rate = MaxRate(self._settings.looked_at_fps(self.fps), self.fps, since_s=0.0)
-        return (index for index in range(len(self._paths)) if rate.chooses(index / self.fps))
 
     def close(self) -> None:
         """Do nothing: no file stays open between images."""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -187,25 +188,23 @@ class LiveRun:
 
     def _open_source(self, connect: Callable[[], Connection] | None, stats: LiveStats) -> LiveSource:
         """Open the camera; numbers and times continue from a saved state."""
-        live, found = self._settings.live, self._checkpoint_file.found
-        max_fps = self._settings.source.max_fps
-        connect = connect or connection_to(self._address, self._settings)
-        if found is None:
-            first = self._checkpoint_file.first
-            return LiveSource(
-                self._address, live, self._recorder, max_fps=max_fps, first=first, connect=connect, stats=stats
-            )
-        since_s = found["time_s"] + max(0.0, time.time() - found["unix_s"])
-        return LiveSource(
+        found = self._checkpoint_file.found
+        opened = partial(
+            LiveSource,
             self._address,
-            live,
+            self._settings.live,
             self._recorder,
-            max_fps=max_fps,
+            max_fps=self._settings.source.max_fps,
+            connect=connect or connection_to(self._address, self._settings),
+            stats=stats,
+        )
+        if found is None:
+            return opened(first=self._checkpoint_file.first)
+        since_s = found["time_s"] + max(0.0, time.time() - found["unix_s"])
+        return opened(
             first=found["frame"] + 1,
             origin_s=monotonic() - since_s,
             like=Frame.blank((found["height"], found["width"]), found["coloured"]),
-            connect=connect,
-            stats=stats,
         )
 
     def _open_events(

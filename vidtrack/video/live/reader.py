@@ -163,7 +163,7 @@ class Reader:
             elif unwanted:
                 self._stats.left_out(now_s)
             elif now_s - pictured_s > self._blind_s:
-                raise Stalled(f"no picture could be decoded for {self._settings.timeout_s:g} s; is the stream damaged?")
+                raise Stalled(f"no picture could be decoded for {self._blind_s:g} s; is the stream damaged?")
             if live:
                 self._deliver(connection, pictures, now_s)
             asked_s = monotonic()

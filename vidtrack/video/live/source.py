@@ -128,8 +128,9 @@ class LiveSource:
         self._reader.stop(_END_S)
 
     def _read_on(self) -> Reader:
-        reading = self.stats, self._settings, self._recorder, self._clock
-        return Reader(self._connect, self._shots, *reading, self._max_fps)
+        return Reader(
+            self._connect, self._shots, self.stats, self._settings, self._recorder, self._clock, self._max_fps
+        )
 
     def _first_shot(self) -> Shot:
         try:
