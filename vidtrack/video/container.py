@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from functools import cached_property
 from itertools import chain
+from math import inf
 from pathlib import Path
 
 import av
@@ -16,11 +17,14 @@ from vidtrack.errors import SourceError
 from vidtrack.video.clock import FALLBACK_FPS, increasing_times, is_plausible, nominal_rate, stamp_rate
 from vidtrack.video.decoder import accelerator
 from vidtrack.video.header import avi_period_s, avi_states_rate, missing_bytes
+from vidtrack.video.left_out import LeftOut
 from vidtrack.video.max_rate import MaxRate
 from vidtrack.video.resources import decoders
 from vidtrack.video.span import ROUNDING_S
 from vidtrack.video.stats import SourceStats
 
+Stamped = tuple[int | None, av.VideoFrame | None]
+"""The stamp of a picture, None without one, and the picture, None if it was left out"""
 _TEXT_CODECS = frozenset({"ansi", "bintext", "xbin", "idf"})  # FFmpeg draws any .txt file as a terminal would
 _RATE_PACKETS, _RATE_BYTES = 64, 32_000_000  # looked at for the rate; raw 4K video reaches the second bound first
 
@@ -52,20 +56,24 @@ class VideoFile:
         self.name = path.stem
         self.fps, self._ticks_per_s = self._rate(settings)
         self.frames = self._stream.frames or self._frames_by_duration()
+        self._left_out = LeftOut(
+            self._stream.codec_context, self._max_rate(), self._ticks_per_s, in_order=not self._is_avi
+        )
         if (missing := missing_bytes(path)) > 0:
             stats.mark_truncated(f"{path} is cut short: {missing} bytes are missing at its end")
 
     def __iter__(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
         begin, pictures = self._from_key() if self._from_s > 0 else (0, self._decoded())
-        stamped = ((self._stamp(picture), picture) for picture in pictures)
+        stamped = ((stamp, (stamp, picture)) for stamp, picture in pictures)
         times = increasing_times(stamped, self._ticks_per_s / self.fps)
         rate = self._max_rate()
-        for index, (ticks, picture) in enumerate(times):
+        for index, (ticks, (stamp, picture)) in enumerate(times):
+            self._left_out.take(stamp, begin + ticks, picture)
             time_s = (begin + ticks) / self._ticks_per_s
-            if rate.chooses(time_s):
+            if rate.chooses(time_s) and picture is not None:
                 yield index, time_s, picture
 
-    def _from_key(self) -> tuple[int, Iterator[av.VideoFrame]]:
+    def _from_key(self) -> tuple[int, Iterator[Stamped]]:
         """The ticks of the key picture before `from_s`, and the pictures from it on.
 
         Of no more than `max_fps` it is that before one interval more: those from `from_s` on are then the right ones.
@@ -78,7 +86,7 @@ class VideoFile:
             self._opening, self._packets = [], self._demuxed()
             pictures = self._decoded()
             first = next(pictures, None)
-            stamp = None if first is None else self._stamp(first)
+            stamp = None if first is None else first[0]
             if first is not None and stamp is not None and stamp <= wanted:
                 return stamp - self._origin, chain([first], pictures)
         raise SourceError(f"no key picture of {self._path} before {self._from_s:g} s is found; it cannot be cut")
@@ -86,8 +94,8 @@ class VideoFile:
     def between(self, begin_s: float, end_s: float, every_s: float = 0.0) -> Iterator[tuple[float, av.VideoFrame]]:
         """(time, picture) of a span of time, decoded from the key frame before it; spans in any order.
 
-        Only pictures that lie `every_s` apart are needed; those between them are left out where that saves decoding,
-        but not with `max_fps`, with which there are few. Where pictures have no stamps, or the place in the file is not
+        Only pictures that lie `every_s` apart are needed, or those of `max_fps`; those between them are left out where
+        that saves decoding. Where pictures have no stamps, or the place in the file is not
         found, the file is read from its beginning. Iterate over the whole file or over spans, not both.
         """
         from_s = max(0.0, begin_s - self._interval_s)
@@ -113,7 +121,10 @@ class VideoFile:
             packets = self._container.demux(self._stream)
             if every_s and not self._is_avi and self._settings.max_fps is None:
                 packets = self._needed(packets, begin_s, end_s, every_s)
+            self._left_out.begin(self._origin)
             for packet in packets:
+                if self._left_out.skips(packet, self._stamp(packet)):
+                    continue
                 for picture in self._stream.codec_context.decode(packet):
                     stamp = self._stamp(picture)
                     if stamp is None:
@@ -154,7 +165,7 @@ class VideoFile:
     @cached_property
     def _origin(self) -> int:
         """The stamp of time 0."""
-        return next((self._stamp(picture) for picture in self._decoded()), None) or 0
+        return next((stamp for stamp, _ in self._decoded()), None) or 0
 
     def _max_rate(self) -> MaxRate:
         return MaxRate(self._settings.looked_at_fps(self.fps), self.fps, since_s=0.0)
@@ -186,12 +197,14 @@ class VideoFile:
                 stuck = True
         yield None
 
-    def _decoded(self) -> Iterator[av.VideoFrame]:
-        """Decoded pictures, including damaged ones that the decoder concealed."""
+    def _decoded(self) -> Iterator[Stamped]:
+        """The pictures, including damaged ones that the decoder concealed, and the places of those that it left out."""
         damaged = partial = False
         for packet in chain(self._opening, self._packets):
             if packet is not None:
                 partial = packet.is_corrupt
+                if self._left_out.skips(packet, self._stamp(packet)):
+                    continue
             try:
                 pictures = self._stream.codec_context.decode(packet)
             except av.FFmpegError as error:
@@ -201,9 +214,15 @@ class VideoFile:
                 damaged = picture.is_corrupt
                 if damaged:
                     self._stats.count_error(f"a picture of {self._path} is damaged")
-                yield picture
+                stamp = self._stamp(picture)
+                yield from self._left_out_before(-inf if stamp is None else stamp)
+                yield stamp, picture
+        yield from self._left_out_before(inf)
         if damaged or partial:
             self._stats.mark_truncated(f"the end of {self._path} cannot be decoded")
+
+    def _left_out_before(self, stamp: float) -> Iterator[Stamped]:
+        return ((left_out, None) for left_out in self._left_out.before(stamp))
 
     @property
     def duration_s(self) -> float | None:

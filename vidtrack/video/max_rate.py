@@ -24,13 +24,24 @@ class MaxRate:
         self._most = None if most == fps else most
         self._early = _EARLY_AT_ANY_RATE if fps is None or most is None else _EARLY * most / fps
         self._since_s = since_s
-        self._last = -inf
+        self._last: float = -inf
+
+    @property
+    def chooses_all(self) -> bool:
+        """Whether all pictures are chosen."""
+        return self._most is None
 
     def chooses(self, time_s: float) -> bool:
         """Whether the picture of this time is looked at; times do not decrease."""
-        if self._most is None:
+        if self.chooses_all:
             return True
         if self._since_s is None:
             self._since_s = time_s
-        last, self._last = self._last, floor((time_s - self._since_s) * self._most + self._early)
+        last, self._last = self._last, self.interval(time_s)
         return self._last > last
+
+    def interval(self, time_s: float) -> int:
+        """Number of the interval in which this time is, of a rate with a limit and a begin."""
+        assert self._most is not None
+        assert self._since_s is not None
+        return floor((time_s - self._since_s) * self._most + self._early)
