@@ -33,14 +33,21 @@ def write_clip(
     stamps_ms: Iterable[int] | None = None,
     options: dict[str, str] | None = None,
     spare: int = 0,
+    coder: dict[str, str] | None = None,
+    ahead: dict[int, int] | None = None,
 ) -> Path:
-    """Encode `frames` frames, at `rate` or at explicit timestamps; of H.264, no other refers to `spare` in a row."""
+    """Encode `frames` frames, at `rate` or at explicit timestamps; of H.264, no other refers to `spare` in a row.
+
+    coder  options of x264
+    ahead  what is added to the stamps of packets, by their numbers
+    """
+    packets: list[av.Packet] = []
     with av.open(str(path), "w", options=options or {}) as container:
         stream = container.add_stream(codec, rate=Fraction(rate).limit_denominator(1001))
         stream.width, stream.height, stream.pix_fmt = *size, pixels
         stream.bit_rate = 2_000_000
         if codec == "libx264":
-            stream.options = {"preset": "ultrafast", "g": "10", "bf": str(spare)}
+            stream.options = {"preset": "ultrafast", "g": "10", "bf": str(spare), **(coder or {})}
         stamps = None if stamps_ms is None else list(stamps_ms)
         if stamps is not None:
             stream.codec_context.time_base = Fraction(1, 1000)
@@ -48,6 +55,9 @@ def write_clip(
             frame = av.VideoFrame.from_ndarray(picture(index, size), format="bgr24").reformat(format=pixels)
             if stamps is not None:
                 frame.pts, frame.time_base = stamps[index], Fraction(1, 1000)
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode())
+            packets += stream.encode(frame)
+        packets += stream.encode()
+        for number, by in (ahead or {}).items():
+            packets[number].pts += by
+        container.mux(packets)
     return path

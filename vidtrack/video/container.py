@@ -70,7 +70,7 @@ class VideoFile:
         for index, (ticks, (stamp, picture)) in enumerate(times):
             self._left_out.take(stamp, begin + ticks, picture)
             time_s = (begin + ticks) / self._ticks_per_s
-            if rate.chooses(time_s) and picture is not None:
+            if picture is not None and rate.chooses(time_s):
                 yield index, time_s, picture
 
     def _from_key(self) -> tuple[int, Iterator[Stamped]]:
@@ -95,8 +95,8 @@ class VideoFile:
         """(time, picture) of a span of time, decoded from the key frame before it; spans in any order.
 
         Only pictures that lie `every_s` apart are needed, or those of `max_fps`; those between them are left out where
-        that saves decoding. Where pictures have no stamps, or the place in the file is not
-        found, the file is read from its beginning. Iterate over the whole file or over spans, not both.
+        that saves decoding. Where pictures have no stamps, or the place in the file is not found, the file is read from
+        its beginning. Iterate over the whole file or over spans, not both.
         """
         from_s = max(0.0, begin_s - self._interval_s)
         latest_s = begin_s + 1 / self.fps if self._settings.max_fps is None else from_s + ROUNDING_S
@@ -129,6 +129,7 @@ class VideoFile:
                     stamp = self._stamp(picture)
                     if stamp is None:
                         return
+                    self._left_out.take(stamp, stamp - self._origin, picture)
                     yield self._time_s(stamp), picture
         except av.FFmpegError:  # damaged here, or without an index
             return
