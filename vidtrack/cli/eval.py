@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from vidtrack.cli.json_file import deliver, json_option
 from vidtrack.cli.options import Options, common, receives, start_log
+
+if TYPE_CHECKING:
+    from vidtrack.formats import Table
+
+log = logging.getLogger(__name__)
+
+_SURELY = 10
+"""Frames with rows, from which on a step between them is told to the user"""
 
 SECTIONS = {
     "counts": {
@@ -78,6 +88,7 @@ class EvalOptions(Options):
     max_distance: float | None
     cutoff: float | None
     order: float
+    every: int
 
 
 @click.command(
@@ -86,6 +97,7 @@ class EvalOptions(Options):
 Examples:
   vidtrack eval runs/junction samples/junction.txt --iou 0.3
   vidtrack eval mot.txt gt.txt --iou 0.3 --json scores.json
+  vidtrack eval runs/ten-a-second gt.txt --every 3
   vidtrack eval tracks.csv truth.csv --points --max-distance 50 --json -""",
 )
 @click.argument("result", type=click.Path(path_type=Path))
@@ -97,6 +109,14 @@ Examples:
 @click.option("--max-distance", type=float, help="Positions match up to this distance.  [default: 20 px or 100 m]")
 @click.option("--cutoff", type=float, help="OSPA, GOSPA cutoff.  [default: 1 for boxes (1 - IoU), else --max-distance]")
 @click.option("--order", default=2.0, show_default=True, help="OSPA, GOSPA order p.")
+@click.option(
+    "--every",
+    default=1,
+    show_default=True,
+    type=click.IntRange(1),
+    metavar="N",
+    help="Score every Nth frame only, from the first on: those that a run with --max-fps has.",
+)
 @receives(EvalOptions)
 def command(options: EvalOptions) -> None:
     """Score RESULT (MOT text, CSV, Parquet or a run folder) against TRUTH (MOT gt.txt or CSV).
@@ -115,9 +135,15 @@ def command(options: EvalOptions) -> None:
     folder = options.folder("eval")
     found = formats.read(result)
     states = formats.read_states(result) if result.is_dir() else None
+    true = read_truth(truth, result) if is_feed(truth) else formats.read(truth)
+    if options.every > 1:
+        found, true = _of_frames(found, options.every), _of_frames(true, options.every)
+        states = None if states is None else _of_frames(states, options.every)
+    else:
+        _tell_of_thinned(found, true)
     scores = score.evaluate(
         found,
-        read_truth(truth, result) if is_feed(truth) else formats.read(truth),
+        true,
         iou=options.iou,
         points=options.points,
         max_distance=options.max_distance,
@@ -127,6 +153,25 @@ def command(options: EvalOptions) -> None:
     )
     if deliver(scores, options.json_to, folder and folder / "scores.json", options.quiet):
         _print_table(scores, f"{result.name} against {truth.name}")
+
+
+def _of_frames(table: Table, every: int) -> Table:
+    """The rows of frames 0, `every`, twice `every`, ..."""
+    return table.select(table.frame % every == 0)
+
+
+def _tell_of_thinned(result: Table, truth: Table) -> None:
+    """Warn if the result has rows in every Nth frame only, and the truth in others."""
+    import numpy as np
+
+    frames = np.unique(result.frame)
+    every = int(np.gcd.reduce(frames)) if len(frames) >= _SURELY else 1
+    between = np.count_nonzero(truth.frame % every)
+    if between > len(truth) / 4:
+        log.warning(
+            "the result has rows in one frame of %d only; the %d rows of the truth in others count as missed, "
+            "and --every %d leaves them out", every, between, every,
+        )  # fmt: skip
 
 
 def _print_table(scores: dict[str, float | int | str], title: str) -> None:
