@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 _SURELY = 10
-"""Frames with rows, from which on a step between them is told to the user"""
+"""So many frames with rows tell the step between them."""
 
 SECTIONS = {
     "counts": {

@@ -216,7 +216,8 @@ class VideoFile:
                 if damaged:
                     self._stats.count_error(f"a picture of {self._path} is damaged")
                 stamp = self._stamp(picture)
-                yield from self._left_out_before(-inf if stamp is None else stamp)
+                if stamp is not None:
+                    yield from self._left_out_before(stamp)
                 yield stamp, picture
         yield from self._left_out_before(inf)
         if damaged or partial:
