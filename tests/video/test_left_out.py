@@ -10,7 +10,14 @@ from vidtrack.video.left_out import LeftOut
 from vidtrack.video.source import Excerpts, open_part, open_source
 
 H264, MJPEG = ("clip.mp4", "libx264", "yuv420p"), ("clip.avi", "mjpeg", "yuvj420p")
-KINDS = [H264, MJPEG, ("clip.mkv", "libx264", "yuv420p"), ("clip.mkv", "mjpeg", "yuvj420p")]
+KINDS = [
+    H264,
+    MJPEG,
+    ("clip.mkv", "libx264", "yuv420p"),
+    ("clip.mkv", "mjpeg", "yuvj420p"),
+    ("clip.mov", "prores_ks", "yuv422p10le"),
+    ("clip.mp4", "jpeg2000", "yuv420p"),
+]
 VARIABLE_MS = np.cumsum([0, *[40, 40, 20, 90, 40, 35, 45, 120, 40, 40] * 6]).tolist()
 KEY_EVERY_20 = {"g": "20"}
 

@@ -85,10 +85,9 @@ class VideoFile:
                 self._container.seek(place, stream=self._stream)
             self._opening, self._packets = [], self._demuxed()
             pictures = self._decoded()
-            first = next(pictures, None)
-            stamp = None if first is None else first[0]
-            if first is not None and stamp is not None and stamp <= wanted:
-                return stamp - self._origin, chain([first], pictures)
+            stamp, picture = next(pictures, (None, None))
+            if stamp is not None and stamp <= wanted:
+                return stamp - self._origin, chain([(stamp, picture)], pictures)
         raise SourceError(f"no key picture of {self._path} before {self._from_s:g} s is found; it cannot be cut")
 
     def between(self, begin_s: float, end_s: float, every_s: float = 0.0) -> Iterator[tuple[float, av.VideoFrame]]:
